@@ -1,0 +1,76 @@
+//! What the spherical-harmonics coefficients of a sample mean.
+//!
+//! One scalar function of direction serves all channels, because τ_c = `extinction`_c · m. It is stored for the
+//! reference extinction κ̄ (the mean of the channels) as one of
+//!
+//! - ψ = exp(-κ̄m): the thesis' choice (section 3.3.1), the documented baseline;
+//! - 1/(κ̄m + ε): near a flat boundary this is a clamped cosine, which few bands capture, where ψ is almost a step.
+//!
+//! Zero coefficients mean darkness in both.
+
+use serde::{Deserialize, Serialize};
+
+/// The function of optical depth that is expanded in spherical harmonics.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Encoding {
+    /// ψ = exp(-τ).
+    Transmittance,
+    /// 1/(τ + ε).
+    Reciprocal {
+        /// ε > 0 bounds the function where light enters at once.
+        epsilon: f32,
+    },
+}
+
+impl Encoding {
+    /// The default: ε = 0.1.
+    pub const RECIPROCAL: Self = Self::Reciprocal { epsilon: 0.1 };
+
+    /// The stored function's value for optical depth `tau` ≥ 0 at the reference extinction.
+    pub fn encode(self, tau: f64) -> f64 {
+        match self {
+            Self::Transmittance => (-tau).exp(),
+            Self::Reciprocal { epsilon } => 1.0 / (tau + f64::from(epsilon)),
+        }
+    }
+
+    /// Optical depth at the reference extinction from a (possibly ringing) reconstructed value: in 0..=∞, never
+    /// NaN for finite input, so that the transmittance stays within 0..1.
+    pub fn decode(self, value: f32) -> f32 {
+        match self {
+            Self::Transmittance => {
+                if value <= 0.0 {
+                    f32::INFINITY
+                } else {
+                    (-value.ln()).max(0.0)
+                }
+            }
+            Self::Reciprocal { epsilon } => {
+                if value <= 0.0 {
+                    f32::INFINITY
+                } else {
+                    (1.0 / value - epsilon).max(0.0)
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Encoding;
+
+    #[test]
+    fn round_trip_and_clamps() {
+        for encoding in [Encoding::Transmittance, Encoding::RECIPROCAL] {
+            for tau in [0.0, 1e-3, 0.5, 4.0, 12.0] {
+                let back = encoding.decode(encoding.encode(tau) as f32);
+                assert!((f64::from(back) - tau).abs() < 1e-4 * (1.0 + tau), "{encoding:?} {tau} {back}");
+            }
+            assert_eq!(encoding.decode(0.0), f32::INFINITY);
+            assert_eq!(encoding.decode(-3.0), f32::INFINITY);
+            assert_eq!(encoding.decode(1e9), 0.0);
+        }
+    }
+}

@@ -1,0 +1,58 @@
+//! The one error type of this crate. Each message says what is wrong, where, and what to do.
+
+use std::path::{Path, PathBuf};
+
+/// Shorthand for results of this crate.
+pub type Result<T> = std::result::Result<T, Error>;
+
+/// What can go wrong with files and their contents.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// The operating system refused to read or write a file.
+    #[error("cannot {action} '{}': {source}", path.display())]
+    Io {
+        /// What was attempted, for example "read".
+        action: &'static str,
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// A file was read but its contents make no sense.
+    #[error("'{}': {message}", path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong and what to do.
+        message: String,
+    },
+    /// A value, wherever it came from, is out of its range.
+    #[error("{0}")]
+    Invalid(String),
+}
+
+impl Error {
+    /// An I/O error on `path` while doing `action` ("read", "write", ...).
+    pub fn io(action: &'static str, path: &Path, source: std::io::Error) -> Self {
+        Self::Io { action, path: path.to_path_buf(), source }
+    }
+
+    /// A complaint about the contents of `path`.
+    pub fn file(path: &Path, message: impl Into<String>) -> Self {
+        Self::File { path: path.to_path_buf(), message: message.into() }
+    }
+
+    /// A complaint about a value.
+    pub fn invalid(message: impl Into<String>) -> Self {
+        Self::Invalid(message.into())
+    }
+
+    /// The same complaint, tied to the file that it came from.
+    pub fn in_file(self, path: &Path) -> Self {
+        match self {
+            Self::Invalid(message) => Self::file(path, message),
+            other => other,
+        }
+    }
+}

@@ -1,0 +1,32 @@
+//! The shared ground of diaphane: the files it reads and writes, and the mathematics that gives them meaning.
+//!
+//! Symbols used throughout (see also the crates `diaphane-bake` and `diaphane-runtime`, which never meet):
+//!
+//! | symbol | meaning | unit |
+//! |---|---|---|
+//! | κt | extinction coefficient, density × `extinction` | 1 / mesh unit |
+//! | Ω | single-scattering albedo | - |
+//! | τ(x,ω) | optical depth from x to infinity along ω, inside pieces only | - |
+//! | m(x,ω) | density length, τ = `extinction` × m | mesh unit |
+//! | ψ = exp(-τ) | transmittance | - |
+//! | Φ(x) = ∫ψ dω | fluence | sr |
+
+pub mod asset;
+pub mod directions;
+pub mod encoding;
+pub mod error;
+pub mod files;
+pub mod fresnel;
+pub mod kernel;
+pub mod material;
+pub mod medium;
+pub mod mesh;
+pub mod phase;
+pub mod picture;
+pub mod reconstruct;
+pub mod scene;
+pub mod sh;
+mod toml_keys;
+pub mod visibility;
+
+pub use error::{Error, Result};

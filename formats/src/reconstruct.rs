@@ -1,0 +1,286 @@
+//! Radiance along a ray from the samples: the sum that the player draws and the bake measures itself with.
+//!
+//! For an inside piece [t0, t1] of a ray and sources v_i (in-scattered radiance per unit of κt dt, per channel)
+//!
+//!   L = A · Σ v_i W_i / Σ W_i,   W_i = w_i ∫ e^{-τ(t)} σ γ_i(t) dt,   A = ∫ e^{-τ} κs/Ω dt
+//!
+//! A constant source comes out exactly. In a homogeneous medium W_i is the closed form of [`crate::kernel`] and
+//! A = 1 - e^{-κ(t1-t0)}. Otherwise a [`Profile`] of the density along the piece supplies τ at the ends of the
+//! kernel's support; between them τ is taken as linear, and σ is the mean scattering density there.
+//! (FINDINGS of the project, section 2; the thesis sums v_i ∫γ_i dt alone, equation 3.4.)
+
+use crate::asset::{DensityGrid, Samples};
+use crate::kernel;
+use glam::{Vec3, Vec3A};
+use obvhs::BvhBuildParams;
+use obvhs::aabb::Aabb;
+use obvhs::bvh2::Bvh2;
+use obvhs::bvh2::builder::build_bvh2;
+use obvhs::ray::Ray;
+
+/// Intervals of a density profile along an inside piece.
+pub const PROFILE_CELLS: usize = 32;
+
+/// Kernels in a box hierarchy, for rays and points.
+pub struct Cloud {
+    /// Centres.
+    pub centre: Vec<Vec3>,
+    /// Sharpness a of each kernel.
+    pub sharpness: Vec<f32>,
+    /// Weight of each kernel.
+    pub weight: Vec<f32>,
+    bvh: Bvh2,
+}
+
+impl Cloud {
+    /// Kernels of an asset's samples.
+    pub fn new(samples: &Samples, width_factor: f32) -> Self {
+        let centre: Vec<Vec3> = (0..samples.len()).map(|i| samples.position(i)).collect();
+        let sharpness: Vec<f32> =
+            samples.position_radius.iter().map(|p| kernel::sharpness(p[3], width_factor)).collect();
+        Self::from_parts(centre, sharpness, samples.weight.clone())
+    }
+
+    /// Kernels from their centres, sharpness and weights (of equal length).
+    pub fn from_parts(centre: Vec<Vec3>, sharpness: Vec<f32>, weight: Vec<f32>) -> Self {
+        let boxes: Vec<Aabb> = centre
+            .iter()
+            .zip(&sharpness)
+            .map(|(c, a)| {
+                let r = Vec3A::splat(kernel::CUT_OFF_RADIUS / a * 1.000_1);
+                Aabb::new(Vec3A::from(*c) - r, Vec3A::from(*c) + r)
+            })
+            .collect();
+        let bvh = if boxes.is_empty() {
+            Bvh2::zeroed(0)
+        } else {
+            build_bvh2(&boxes, BvhBuildParams::fast_build(), &mut Default::default())
+        };
+        Self { centre, sharpness, weight, bvh }
+    }
+
+    /// Calls `visit` with every kernel whose support may meet the ray between `start` and `end`.
+    pub fn for_each_near_ray(&self, origin: Vec3, direction: Vec3, start: f32, end: f32, mut visit: impl FnMut(usize)) {
+        if self.centre.is_empty() {
+            return;
+        }
+        let from = Vec3A::from(origin + direction * start);
+        let ray = Ray::new(from, Vec3A::from(direction) + Vec3A::ZERO, 0.0, end - start);
+        self.bvh.ray_traverse_anyhit(ray, |_, slot| visit(self.bvh.primitive_indices[slot] as usize));
+    }
+
+    /// Calls `visit` with every kernel whose support may hold the point.
+    pub fn for_each_near_point(&self, point: Vec3, mut visit: impl FnMut(usize)) {
+        if self.centre.is_empty() {
+            return;
+        }
+        self.bvh.point_traverse(Vec3A::from(point), |bvh, index| {
+            let node = &bvh.nodes[index as usize];
+            for slot in node.first_index..node.first_index + node.prim_count {
+                visit(bvh.primitive_indices[slot as usize] as usize);
+            }
+            true
+        });
+    }
+}
+
+/// How the medium attenuates along one inside piece.
+#[derive(Clone, Debug)]
+pub enum Along {
+    /// κt per channel, the same everywhere.
+    Uniform(Vec3),
+    /// κt per unit density, and a density profile.
+    Profile(Vec3, Box<Profile>),
+}
+
+/// Running integrals of the density along an inside piece, at equally spaced points.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Profile {
+    start: f32,
+    cell: f32,
+    /// ∫ρ from the piece's start.
+    pub density: [f32; PROFILE_CELLS + 1],
+    /// ∫ of the scattering part of ρ.
+    pub scattering: [f32; PROFILE_CELLS + 1],
+}
+
+impl Profile {
+    /// Marches `grid` from `start` to `end` with `SUBSTEPS` midpoints in each cell.
+    pub fn march(grid: &DensityGrid, origin: Vec3, direction: Vec3, start: f32, end: f32) -> Self {
+        const SUBSTEPS: usize = 2;
+        let cell = (end - start) / PROFILE_CELLS as f32;
+        let h = cell / SUBSTEPS as f32;
+        let mut profile =
+            Self { start, cell, density: [0.0; PROFILE_CELLS + 1], scattering: [0.0; PROFILE_CELLS + 1] };
+        let mut sum = [0.0f32; 2];
+        for k in 0..PROFILE_CELLS {
+            for s in 0..SUBSTEPS {
+                let t = start + (k as f32 * SUBSTEPS as f32 + s as f32 + 0.5) * h;
+                let value = grid.value(origin + direction * t);
+                sum[0] += value[0] * h;
+                sum[1] += value[1] * h;
+            }
+            profile.density[k + 1] = sum[0];
+            profile.scattering[k + 1] = sum[1];
+        }
+        profile
+    }
+
+    /// [∫ρ, ∫scattering ρ] from the piece's start to `t`, linear between the points.
+    pub fn at(&self, t: f32) -> [f32; 2] {
+        let s = ((t - self.start) / self.cell).clamp(0.0, PROFILE_CELLS as f32);
+        let i = (s as usize).min(PROFILE_CELLS - 1);
+        let f = s - i as f32;
+        let lerp = |v: &[f32; PROFILE_CELLS + 1]| v[i] + (v[i + 1] - v[i]) * f;
+        [lerp(&self.density), lerp(&self.scattering)]
+    }
+}
+
+impl Along {
+    /// Transmittance of the whole piece `start..end`, per channel.
+    pub fn transmittance(&self, start: f32, end: f32) -> Vec3 {
+        match self {
+            Self::Uniform(kappa) => (-*kappa * (end - start)).exp(),
+            Self::Profile(kappa, p) => (-*kappa * p.density[PROFILE_CELLS]).exp(),
+        }
+    }
+
+    /// A of the module's head, per channel.
+    pub fn emission(&self, start: f32, end: f32) -> Vec3 {
+        match self {
+            Self::Uniform(kappa) => {
+                (*kappa * (end - start)).to_array().map(|y| y * kernel::decay_mean(y)).into()
+            }
+            Self::Profile(kappa, p) => {
+                let mut sum = Vec3::ZERO;
+                for k in 0..PROFILE_CELLS {
+                    let optical = *kappa * (p.density[k + 1] - p.density[k]);
+                    let mean = Vec3::from(optical.to_array().map(kernel::decay_mean));
+                    let scattering = *kappa * (p.scattering[k + 1] - p.scattering[k]);
+                    sum += (-*kappa * p.density[k]).exp() * scattering * mean;
+                }
+                sum
+            }
+        }
+    }
+
+    /// W_i without w_i: `grey` computes one channel and repeats it.
+    fn kernel_weight(&self, grey: bool, a: f32, d2: f32, tc: f32, start: f32, from: f32, to: f32) -> Vec3 {
+        let (kappa, before, density) = match self {
+            Self::Uniform(kappa) => (*kappa, from - start, 1.0),
+            Self::Profile(kappa, p) => {
+                let (first, last) = (p.at(from), p.at(to));
+                let inverse = 1.0 / (to - from);
+                let slope = (last[0] - first[0]) * inverse;
+                let scattering = (last[1] - first[1]) * inverse;
+                let weigh = |k: f32| scattering * (-k * first[0]).exp() * kernel::integral(a, d2, tc, k * slope, from, to);
+                return if grey { Vec3::splat(weigh(kappa.x)) } else { kappa.to_array().map(weigh).into() };
+            }
+        };
+        let weigh = |k: f32| density * (-k * before).exp() * kernel::integral(a, d2, tc, k, from, to);
+        if grey { Vec3::splat(weigh(kappa.x)) } else { kappa.to_array().map(weigh).into() }
+    }
+}
+
+/// Sum over one inside piece.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct PieceSum {
+    /// Radiance that leaves the piece towards the camera.
+    pub radiance: Vec3,
+    /// Kernels that contributed.
+    pub splats: u32,
+}
+
+/// Radiance of one inside piece `start..end` of a ray (unit direction), seen from its start. `source` holds v_i.
+pub fn piece_radiance(
+    cloud: &Cloud,
+    source: &[Vec3],
+    origin: Vec3,
+    direction: Vec3,
+    start: f32,
+    end: f32,
+    along: &Along,
+) -> PieceSum {
+    let kappa = match along {
+        Along::Uniform(k) | Along::Profile(k, _) => *k,
+    };
+    let grey = kappa.x == kappa.y && kappa.y == kappa.z;
+    let (mut numerator, mut denominator, mut splats) = (Vec3::ZERO, Vec3::ZERO, 0);
+    cloud.for_each_near_ray(origin, direction, start, end, |i| {
+        let to_centre = cloud.centre[i] - origin;
+        let tc = to_centre.dot(direction);
+        let d2 = (to_centre - direction * tc).length_squared();
+        let a = cloud.sharpness[i];
+        if let Some((from, to)) = kernel::clip(a, d2, tc, start, end) {
+            let w = cloud.weight[i] * along.kernel_weight(grey, a, d2, tc, start, from, to);
+            numerator += source[i] * w;
+            denominator += w;
+            splats += 1;
+        }
+    });
+    let emission = along.emission(start, end);
+    let mean = |k: usize| if denominator[k] > 0.0 { numerator[k] / denominator[k] } else { 0.0 };
+    PieceSum { radiance: emission * Vec3::new(mean(0), mean(1), mean(2)), splats }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn cloud() -> Cloud {
+        let mut centre = Vec::new();
+        for i in 0..7 {
+            for j in 0..7 {
+                for k in 0..7 {
+                    centre.push(Vec3::new(i as f32, j as f32, k as f32) * 0.25 - 0.75);
+                }
+            }
+        }
+        let n = centre.len();
+        Cloud::from_parts(centre, vec![kernel::sharpness(0.25, 1.4); n], vec![1.0; n])
+    }
+
+    #[test]
+    fn constant_source_is_exact() {
+        let cloud = cloud();
+        let source = vec![Vec3::new(1.0, 2.0, 3.0); cloud.centre.len()];
+        for kappa in [0.0, 0.1, 3.0, 40.0] {
+            let along = Along::Uniform(Vec3::new(kappa, 2.0 * kappa, 0.5 * kappa));
+            let direction = Vec3::new(0.1, 0.2, -1.0).normalize();
+            let sum = piece_radiance(&cloud, &source, Vec3::new(0.0, 0.0, 3.0), direction, 2.4, 3.7, &along);
+            for (c, factor) in [(0, 1.0), (1, 2.0), (2, 0.5)] {
+                let exact = source[0][c] * (1.0 - (-kappa * factor * 1.3f32).exp());
+                assert!((sum.radiance[c] - exact).abs() <= 2e-5 * exact.max(1e-3), "{kappa} {c}");
+            }
+        }
+    }
+
+    #[test]
+    fn flat_profile_agrees_with_uniform() {
+        let cloud = cloud();
+        let source: Vec<Vec3> = cloud.centre.iter().map(|c| Vec3::splat(1.0 + c.x)).collect();
+        let grid = DensityGrid {
+            size: [1, 1, 1],
+            min: [-1.0; 3],
+            max: [1.0; 3],
+            values: vec![[half::f16::from_f32(0.5); 2]],
+        };
+        let (origin, direction) = (Vec3::new(3.0, 0.1, 0.05), -Vec3::X);
+        let kappa = Vec3::new(4.0, 4.0, 4.0);
+        let profile = Profile::march(&grid, origin, direction, 2.3, 3.7);
+        let a = Along::Profile(kappa, Box::new(profile));
+        let b = Along::Uniform(0.5 * kappa);
+        let x = piece_radiance(&cloud, &source, origin, direction, 2.3, 3.7, &a);
+        let y = piece_radiance(&cloud, &source, origin, direction, 2.3, 3.7, &b);
+        assert!((x.radiance - y.radiance).length() < 1e-4 * y.radiance.length(), "{x:?} {y:?}");
+        assert!((a.transmittance(2.3, 3.7) - b.transmittance(2.3, 3.7)).length() < 1e-5);
+    }
+
+    #[test]
+    fn no_samples_no_light() {
+        let cloud = Cloud::from_parts(vec![], vec![], vec![]);
+        let along = Along::Uniform(Vec3::ONE);
+        let sum = piece_radiance(&cloud, &[], Vec3::ZERO, Vec3::X, 0.0, 1.0, &along);
+        assert_eq!(sum, PieceSum::default());
+    }
+}

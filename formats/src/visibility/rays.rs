@@ -1,0 +1,90 @@
+//! Optical depth and inside pieces along single rays, from the crossings of [`Accel`].
+
+use super::{Accel, Crossing};
+use crate::fresnel;
+use crate::medium::Medium;
+use glam::DVec3;
+
+/// What lies between a point and the light.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Depth {
+    /// m: ∫ρ over the inside pieces, mesh units.
+    pub density_length: f64,
+    /// Product of Fresnel transmittances of the crossings, 0..1.
+    pub boundary: f64,
+    /// Exits minus entries: the winding number of the starting point, 1 for a point inside a clean mesh.
+    pub winding: i32,
+}
+
+/// Depth of `origin` along the unit vector `direction` up to distance `limit` (infinity for a distant light), by the
+/// signed sum over crossings: no sorting. `scratch` is reused between calls.
+///
+/// A point within rounding of the surface may miss its own exit: that exit would add 0, so nothing is lost.
+/// Where the light itself is inside (`limit` finite) the piece that it ends is closed there.
+pub fn depth_along(
+    accel: &Accel,
+    medium: &Medium,
+    origin: DVec3,
+    direction: DVec3,
+    limit: f64,
+    scratch: &mut Vec<Crossing>,
+) -> Depth {
+    accel.crossings(origin, direction, 0.0, f64::INFINITY, scratch);
+    let mut depth = Depth { density_length: 0.0, boundary: 1.0, winding: 0 };
+    for c in scratch.iter() {
+        depth.winding += c.sign;
+        let t = c.t.min(limit);
+        depth.density_length += f64::from(c.sign) * medium.density_length(origin, direction, 0.0, t);
+        if c.t < limit && medium.ior() != 1.0 {
+            depth.boundary *= fresnel::transmittance(direction.dot(accel.normal(c.triangle)), medium.ior());
+        }
+    }
+    depth.density_length = depth.density_length.max(0.0);
+    depth
+}
+
+/// One stretch of a ray inside the object.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct InsidePiece {
+    /// Where it starts (0 when the ray starts inside).
+    pub start: f64,
+    /// Where it ends.
+    pub end: f64,
+    /// Fresnel transmittance of its entry (1 when the ray starts inside), and of its exit.
+    pub boundary: [f64; 2],
+    /// Triangle of the entry; `u32::MAX` when the ray starts inside.
+    pub entry: u32,
+}
+
+/// Sorted inside pieces of a ray for t ≥ 0: where the winding number is positive.
+pub fn inside_pieces(
+    accel: &Accel,
+    ior: f64,
+    origin: DVec3,
+    direction: DVec3,
+    scratch: &mut Vec<Crossing>,
+    out: &mut Vec<InsidePiece>,
+) {
+    out.clear();
+    accel.crossings(origin, direction, 0.0, f64::INFINITY, scratch);
+    scratch.sort_unstable_by(|a, b| a.t.total_cmp(&b.t).then(b.sign.cmp(&a.sign)));
+    let mut winding: i32 = scratch.iter().map(|c| c.sign).sum();
+    let unit = direction.normalize_or_zero();
+    let through = |c: &Crossing| {
+        if ior == 1.0 { 1.0 } else { fresnel::transmittance(unit.dot(accel.normal(c.triangle)), ior) }
+    };
+    let mut open = (winding > 0).then_some((0.0, 1.0, u32::MAX));
+    for c in scratch.iter() {
+        winding -= c.sign;
+        match open {
+            None if winding > 0 => open = Some((c.t, through(c), c.triangle)),
+            Some((start, entry, triangle)) if winding <= 0 => {
+                if c.t > start {
+                    out.push(InsidePiece { start, end: c.t, boundary: [entry, through(c)], entry: triangle });
+                }
+                open = None;
+            }
+            _ => {}
+        }
+    }
+}
