@@ -1,1 +1,13 @@
-//! Placeholder.
+//! Plays baked translucent assets: a wgpu renderer and its CPU twin.
+//!
+//! ```text
+//! Asset ─┬─ Frame (camera, lights as plain data, relative to the asset's centre)
+//!        ├─ cpu: lighting -> segments -> splat -> picture      (rayon; fallback and oracle)
+//!        └─ gpu: surface -> lighting -> splat -> resolve       (wgpu; one module and one shader per pass)
+//! ```
+
+pub mod frame;
+
+mod error;
+
+pub use error::{Error, Result};

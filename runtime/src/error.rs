@@ -1,0 +1,19 @@
+//! The error type of this crate.
+
+/// Shorthand for results of this crate.
+pub type Result<T> = std::result::Result<T, Error>;
+
+/// What can go wrong while playing an asset.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// A file or its contents.
+    #[error(transparent)]
+    Formats(#[from] diaphane_formats::Error),
+    /// No GPU adapter that can draw measured pictures.
+    #[error("no usable GPU adapter: {0}; use the CPU backend")]
+    NoAdapter(String),
+    /// The GPU failed while drawing.
+    #[error("the GPU failed: {0}")]
+    Gpu(String),
+}
