@@ -6,7 +6,9 @@
 //!        └─ gpu: surface -> lighting -> splat -> resolve       (wgpu; one module and one shader per pass)
 //! ```
 
+pub mod cpu;
 pub mod frame;
+pub mod rendered;
 
 mod error;
 

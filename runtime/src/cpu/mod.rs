@@ -1,0 +1,3 @@
+//! The CPU twin of every pass.
+
+pub mod surface;
