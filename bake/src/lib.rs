@@ -1,1 +1,61 @@
-//! Placeholder.
+//! Bakes a translucent mesh: thesis chapter 3, algorithms 1 and 2.
+//!
+//! ```text
+//! mesh ─ field ─ layers ─ density ─ samples ─ fit (optical depth, harmonics, weights) ─ pack ─ asset
+//! ```
+//!
+//! A stage imports only the stages before it. Nothing here prints; progress and cancellation go through
+//! [`progress::Progress`].
+
+mod density;
+mod error;
+mod field;
+mod fit;
+mod layers;
+mod pack;
+pub mod params;
+pub mod progress;
+pub mod report;
+mod samples;
+
+pub use error::{Error, Result};
+
+use diaphane_formats::asset::Asset;
+use diaphane_formats::medium::Medium;
+use diaphane_formats::mesh::{Mesh, MeshReport};
+use params::Params;
+use progress::{Progress, Timed};
+use report::Report;
+
+/// What is baked.
+pub struct Input<'a> {
+    /// Closed boundary mesh.
+    pub mesh: &'a Mesh,
+    /// What was mended in it, for the provenance.
+    pub mesh_report: &'a MeshReport,
+    /// What fills it.
+    pub medium: &'a Medium,
+    /// Name of the mesh for the provenance.
+    pub mesh_name: String,
+    /// Name of the material for the provenance.
+    pub material_name: String,
+}
+
+/// Bakes `input`. The same input, parameters and version give the same asset, whatever the number of threads.
+///
+/// # Errors
+/// Parameters out of range, a mesh that leaves no room for samples, cancellation.
+pub fn bake(input: &Input<'_>, params: &Params, progress: &dyn Progress) -> Result<(Asset, Report)> {
+    params.validate()?;
+    let mut timed = Timed::new(progress);
+    let shape = timed.stage("distance field", |p| field::Shape::new(input.mesh, params, p))?;
+    let layers = timed.stage("layers", |p| layers::build(&shape, input.medium, params, p))?;
+    let density = timed.stage("density", |p| density::evaluate(&shape, &layers, input.medium, params, p))?;
+    let placed = timed.stage("samples", |p| samples::place(&shape, &layers, &density, input.medium, params, p))?;
+    let lit = timed.stage("optical depth", |p| fit::depths(&shape, input.medium, placed, params, p))?;
+    let harmonics = timed.stage("harmonics", |p| fit::harmonics(&lit, input.medium, params, p))?;
+    let weights = timed.stage("weights", |p| fit::weights(&lit, params, p))?;
+    let asset = timed.stage("packing", |_| pack::pack(input, params, &lit, harmonics, weights))?;
+    let report = Report::new(params, &shape, &layers, &lit, &asset, timed.seconds);
+    Ok((asset, report))
+}

@@ -8,7 +8,7 @@ use std::f64::consts::PI;
 
 /// A phase function.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(tag = "type", rename_all = "kebab-case", deny_unknown_fields)]
+#[serde(rename_all = "kebab-case")]
 pub enum Phase {
     /// 1 / 4π in every direction.
     Isotropic,

@@ -1,0 +1,190 @@
+//! Arguments and what they do.
+
+use crate::inspect;
+use crate::terminal::Bars;
+use anyhow::{Context, bail};
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use diaphane_bake::params::{Params, Preset};
+use diaphane_bake::{Input, bake};
+use diaphane_formats::encoding::Encoding;
+use diaphane_formats::{asset, files, material, mesh};
+use std::path::{Path, PathBuf};
+
+/// Bakes a closed mesh filled with a translucent material into one compact asset for the player.
+#[derive(Parser)]
+#[command(
+    version,
+    args_conflicts_with_subcommands = true,
+    subcommand_negates_reqs = true,
+    after_help = "Examples:\n  \
+        diaphane-bake bunny.obj --material wax.material.toml --output bunny.dph\n  \
+        diaphane-bake bunny.obj --material wax.material.toml --output bunny.dph --preset draft\n  \
+        diaphane-bake bunny.obj --material wax.material.toml --output bunny.dph --samples 100000 --report bake.json\n  \
+        diaphane-bake inspect bunny.dph --json"
+)]
+pub struct Arguments {
+    #[command(subcommand)]
+    command: Option<Command>,
+    #[command(flatten)]
+    bake: BakeArguments,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Shows what is in an asset, and its sizes.
+    Inspect {
+        /// The asset.
+        asset: PathBuf,
+        /// As JSON.
+        #[arg(long)]
+        json: bool,
+    },
+}
+
+#[derive(Args)]
+struct BakeArguments {
+    /// The mesh: a closed surface in OBJ format.
+    #[arg(required = true)]
+    mesh: Option<PathBuf>,
+    /// What fills it (*.material.toml).
+    #[arg(long, required = true, value_name = "M.toml")]
+    material: Option<PathBuf>,
+    /// The asset to write.
+    #[arg(long, short, required = true, value_name = "A.dph")]
+    output: Option<PathBuf>,
+    /// A set of parameters; the options below override it.
+    #[arg(long, value_enum, default_value_t = PresetName::Standard)]
+    preset: PresetName,
+    /// Stored samples (met within 5 %).
+    #[arg(long, value_name = "N")]
+    samples: Option<usize>,
+    /// Directions in which the optical depth of each sample is computed.
+    #[arg(long, value_name = "D")]
+    directions: Option<usize>,
+    /// Bands of spherical harmonics, 1 to 10.
+    #[arg(long, value_name = "K")]
+    sh_order: Option<usize>,
+    /// What the harmonics represent: 1/(τ+ε) fitted to the transmittance, or the plain transmittance.
+    #[arg(long, value_enum, default_value_t = EncodingName::Reciprocal)]
+    encoding: EncodingName,
+    /// Seed of all random choices.
+    #[arg(long, value_name = "S")]
+    seed: Option<u64>,
+    /// Threads to use; all cores if not given. The asset does not depend on it.
+    #[arg(long, value_name = "T")]
+    threads: Option<usize>,
+    /// Writes a report in JSON.
+    #[arg(long, value_name = "R.json")]
+    report: Option<PathBuf>,
+    /// No progress bars and no summary.
+    #[arg(long, short)]
+    quiet: bool,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum PresetName {
+    /// 5,000 samples, 96 directions, 5 bands.
+    Draft,
+    /// 50,000 samples, 256 directions, 7 bands.
+    Standard,
+    /// 50,000 samples, 512 directions, 9 bands.
+    Fine,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum EncodingName {
+    Reciprocal,
+    Transmittance,
+}
+
+impl BakeArguments {
+    fn params(&self) -> Params {
+        let mut params = Params::preset(match self.preset {
+            PresetName::Draft => Preset::Draft,
+            PresetName::Standard => Preset::Standard,
+            PresetName::Fine => Preset::Fine,
+        });
+        params.samples = self.samples.unwrap_or(params.samples);
+        params.directions = self.directions.unwrap_or(params.directions);
+        params.order = self.sh_order.unwrap_or(params.order);
+        params.seed = self.seed.unwrap_or(params.seed);
+        params.encoding = match self.encoding {
+            EncodingName::Reciprocal => Encoding::RECIPROCAL,
+            EncodingName::Transmittance => Encoding::Transmittance,
+        };
+        params
+    }
+}
+
+/// Runs the command line.
+pub fn run(arguments: Arguments) -> anyhow::Result<()> {
+    match arguments.command {
+        Some(Command::Inspect { asset, json }) => inspect::show(&asset, json),
+        None => run_bake(&arguments.bake),
+    }
+}
+
+fn run_bake(arguments: &BakeArguments) -> anyhow::Result<()> {
+    let (Some(mesh_path), Some(material_path), Some(output)) =
+        (&arguments.mesh, &arguments.material, &arguments.output)
+    else {
+        bail!("MESH, --material and --output are needed; see --help");
+    };
+    for input in [mesh_path, material_path] {
+        files::require_different(output, input)?;
+        if let Some(report) = &arguments.report {
+            files::require_different(report, input)?;
+        }
+    }
+    if let Some(report) = &arguments.report {
+        files::require_different(report, output)?;
+        files::require_writable(report)?;
+    }
+    files::require_writable(output)?;
+    if let Some(threads) = arguments.threads {
+        if !(1..=1024).contains(&threads) {
+            bail!("--threads must lie within 1..1024, not {threads}");
+        }
+        rayon::ThreadPoolBuilder::new().num_threads(threads).build_global().context("cannot start the threads")?;
+    }
+    let medium = material::load(material_path)?;
+    let (mesh, mesh_report) = mesh::load_obj(mesh_path)?;
+    if !arguments.quiet {
+        for line in mesh_report.warnings() {
+            eprintln!("{}: {line}", mesh_path.display());
+        }
+    }
+    let bars = Bars::new(arguments.quiet);
+    bars.cancel_on_interrupt().context("cannot listen for Ctrl-C")?;
+    let input = Input {
+        mesh: &mesh,
+        mesh_report: &mesh_report,
+        medium: &medium,
+        mesh_name: file_name(mesh_path),
+        material_name: file_name(material_path),
+    };
+    let result = bake(&input, &arguments.params(), &bars);
+    bars.finish();
+    let (baked, report) = result?;
+    asset::write(output, &baked)?;
+    if let Some(path) = &arguments.report {
+        let text = serde_json::to_string_pretty(&report).context("cannot encode the report")?;
+        files::write_atomically(path, text.as_bytes())?;
+    }
+    if !arguments.quiet {
+        println!(
+            "{}: {} samples, {} directions, {} bands, {:.1} MB, {:.1} s",
+            output.display(),
+            report.samples,
+            report.directions,
+            report.sh_order,
+            report.bytes as f64 / 1e6,
+            report.seconds.get("total").copied().unwrap_or_default()
+        );
+    }
+    Ok(())
+}
+
+fn file_name(path: &Path) -> String {
+    path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default()
+}

@@ -1,0 +1,119 @@
+//! The signed distance field of the mesh on a regular grid, and exact queries behind it.
+//!
+//! Depth is positive inside. Inside is decided by majority over three directions of projected winding numbers; the
+//! distance by closest-point queries on the box hierarchy. Outside nodes further than two cells from the surface are
+//! not needed by anyone and are skipped.
+
+use crate::params::Params;
+use crate::progress::Stage;
+use crate::{Error, Result};
+use diaphane_formats::directions::even_directions;
+use diaphane_formats::medium::{Density, Medium};
+use diaphane_formats::mesh::Mesh;
+use diaphane_formats::phase::Phase;
+use diaphane_formats::visibility::{Accel, project};
+use glam::DVec3;
+use rayon::prelude::*;
+
+/// The mesh with its distance field.
+pub(crate) struct Shape<'a> {
+    pub mesh: &'a Mesh,
+    pub accel: Accel,
+    pub diagonal: f64,
+    /// Mean distance between samples if they filled the volume evenly.
+    pub spacing: f64,
+    pub grid: DistanceGrid,
+    /// Grid nodes that needed no distance query.
+    pub skipped_nodes: usize,
+}
+
+/// Depth at the nodes of a regular grid.
+pub(crate) struct DistanceGrid {
+    pub size: [usize; 3],
+    pub origin: DVec3,
+    pub cell: f64,
+    pub depth: Vec<f32>,
+}
+
+impl DistanceGrid {
+    pub fn index(&self, i: usize, j: usize, k: usize) -> usize {
+        (k * self.size[1] + j) * self.size[0] + i
+    }
+
+    /// Depth at the node nearest to `p`, if it is inside.
+    pub fn depth_near(&self, p: DVec3) -> Option<f64> {
+        let s = ((p - self.origin) / self.cell).round();
+        let inside = (0..3).all(|k| s[k] >= 0.0 && s[k] < self.size[k] as f64);
+        let depth = inside.then(|| f64::from(self.depth[self.index(s.x as usize, s.y as usize, s.z as usize)]))?;
+        (depth > 0.0).then_some(depth)
+    }
+
+    pub fn node(&self, index: usize) -> DVec3 {
+        let (i, rest) = (index % self.size[0], index / self.size[0]);
+        let (j, k) = (rest % self.size[1], rest / self.size[1]);
+        self.origin + DVec3::new(i as f64, j as f64, k as f64) * self.cell
+    }
+}
+
+impl<'a> Shape<'a> {
+    pub fn new(mesh: &'a Mesh, params: &Params, stage: Stage<'_>) -> Result<Self> {
+        let accel = Accel::new(mesh);
+        let diagonal = mesh.diagonal();
+        let spacing = (mesh.volume() / params.samples as f64).cbrt();
+        let (low, high) = mesh.bounds();
+        let extent = high - low;
+        // Fine enough for the samples, never so fine that the grid dominates the bake.
+        let longest = extent.max_element();
+        let cells = (longest / (0.6 * spacing)).clamp(24.0, 80.0);
+        let cell = longest / cells;
+        let origin = low - 1.5 * cell;
+        let size = [extent.x, extent.y, extent.z].map(|e| (e / cell).ceil() as usize + 4);
+        let mut grid = DistanceGrid { size, origin, cell, depth: Vec::new() };
+        let count = size.iter().product::<usize>();
+        stage.expect(count);
+        let nodes: Vec<DVec3> = (0..count).map(|i| grid.node(i)).collect();
+        let inside = inside_nodes(mesh, &nodes)?;
+        let skipped = std::sync::atomic::AtomicUsize::new(0);
+        let band = 2.0 * cell;
+        let chunk = 4096;
+        let depth: Vec<Vec<f32>> = nodes
+            .par_chunks(chunk)
+            .zip(inside.par_chunks(chunk))
+            .map(|(nodes, inside)| {
+                let values = nodes
+                    .iter()
+                    .zip(inside)
+                    .map(|(p, &inside)| {
+                        let limit = if inside { f64::INFINITY } else { band };
+                        match accel.nearest(*p, limit) {
+                            Some(n) if inside => n.distance as f32,
+                            Some(n) => -n.distance as f32,
+                            None => {
+                                skipped.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+                                -band as f32
+                            }
+                        }
+                    })
+                    .collect();
+                stage.step(nodes.len())?;
+                Ok(values)
+            })
+            .collect::<Result<_>>()?;
+        grid.depth = depth.concat();
+        if !grid.depth.iter().any(|d| *d > 0.0) && mesh.volume() <= 0.0 {
+            return Err(Error::NoRoom("it has no inside".to_owned()));
+        }
+        let skipped_nodes = skipped.into_inner();
+        Ok(Self { mesh, accel, diagonal, spacing, grid, skipped_nodes })
+    }
+}
+
+/// Majority vote over three lines through each node, each seen from both ends.
+pub(crate) fn inside_nodes(mesh: &Mesh, nodes: &[DVec3]) -> Result<Vec<bool>> {
+    let unit = Medium::new(DVec3::ONE, DVec3::ZERO, Phase::Isotropic, 1.0, Density::Uniform(1.0))?;
+    let axes = even_directions(6, 0x5eed);
+    let votes: Vec<_> = [axes[0], axes[2], axes[4]].par_iter().map(|axis| project(mesh, &unit, nodes, *axis).winding).collect();
+    Ok((0..nodes.len())
+        .map(|i| votes.iter().flatten().filter(|w| w[i] > 0).count() > 3)
+        .collect())
+}

@@ -1,0 +1,115 @@
+//! Kernel weights that make the sum of all kernels as even as possible.
+//!
+//! Non-negative least squares Σ_i w_i γ_i(x) = 1 over random inside points, weighted by √Φ, by multiplicative updates
+//! w_i ← w_i (AᵀWb)_i / (AᵀWAw)_i (Lee and Seung 2001), which keep every weight positive.
+
+use super::depths::Lit;
+use crate::Result;
+use crate::params::Params;
+use crate::progress::Stage;
+use diaphane_formats::kernel;
+use diaphane_formats::reconstruct::Cloud;
+use glam::Vec3;
+use rayon::prelude::*;
+
+const ITERATIONS: usize = 60;
+
+/// A sparse matrix by rows.
+struct Rows {
+    start: Vec<usize>,
+    entries: Vec<(u32, f32)>,
+}
+
+impl Rows {
+    fn new(lists: Vec<Vec<(u32, f32)>>) -> Self {
+        let mut start = vec![0];
+        for list in &lists {
+            start.push(start[start.len() - 1] + list.len());
+        }
+        Self { start, entries: lists.concat() }
+    }
+
+    fn row(&self, i: usize) -> &[(u32, f32)] {
+        &self.entries[self.start[i]..self.start[i + 1]]
+    }
+
+    fn len(&self) -> usize {
+        self.start.len() - 1
+    }
+
+    fn transposed(&self, columns: usize) -> Self {
+        let mut start = vec![0usize; columns + 1];
+        for (c, _) in &self.entries {
+            start[*c as usize + 1] += 1;
+        }
+        for i in 1..start.len() {
+            start[i] += start[i - 1];
+        }
+        let mut next = start.clone();
+        let mut entries = vec![(0, 0.0); self.entries.len()];
+        for r in 0..self.len() {
+            for (c, v) in self.row(r) {
+                let slot = &mut next[*c as usize];
+                entries[*slot] = (r as u32, *v);
+                *slot += 1;
+            }
+        }
+        Self { start, entries }
+    }
+
+    fn times(&self, x: &[f32]) -> Vec<f32> {
+        (0..self.len())
+            .into_par_iter()
+            .map(|r| self.row(r).iter().map(|(c, v)| v * x[*c as usize]).sum())
+            .collect()
+    }
+}
+
+pub(crate) fn weights(lit: &Lit, params: &Params, stage: Stage<'_>) -> Result<Vec<f32>> {
+    stage.expect(ITERATIONS);
+    let origin = lit.samples.first().map_or(glam::DVec3::ZERO, |s| s.position);
+    let local = |p: glam::DVec3| (p - origin).as_vec3();
+    let centre: Vec<Vec3> = lit.samples.iter().map(|s| local(s.position)).collect();
+    let sharpness: Vec<f32> =
+        lit.samples.iter().map(|s| kernel::sharpness(s.radius as f32, params.width_factor)).collect();
+    let n = centre.len();
+    let cloud = Cloud::from_parts(centre, sharpness, vec![1.0; n]);
+    // Each row of the system is a probe, scaled by the fourth root of its fluence (√Φ in the squared error).
+    let lists: Vec<Vec<(u32, f32)>> = lit
+        .probes
+        .par_iter()
+        .map(|probe| {
+            let p = local(probe.position);
+            let mut row = Vec::new();
+            cloud.for_each_near_point(p, |i| {
+                let v = kernel::value(cloud.sharpness[i], (cloud.centre[i] - p).length_squared());
+                if v > 0.0 {
+                    row.push((i as u32, v));
+                }
+            });
+            row.sort_unstable_by_key(|(i, _)| *i);
+            row
+        })
+        .collect();
+    let importance: Vec<f32> = lit.probes.iter().map(|p| p.fluence.max(1e-6).sqrt() as f32).collect();
+    let by_probe = Rows::new(lists);
+    let by_sample = by_probe.transposed(n);
+    let wanted = by_sample.times(&importance);
+    let mut w = vec![1.0f32; n];
+    // Start at the right overall level.
+    let level = by_probe.times(&w);
+    let mean = level.iter().zip(&importance).map(|(l, i)| f64::from(l * i)).sum::<f64>()
+        / importance.iter().map(|i| f64::from(*i)).sum::<f64>().max(1e-30);
+    w.fill((1.0 / mean.max(1e-6)) as f32);
+    for _ in 0..ITERATIONS {
+        let sum: Vec<f32> = by_probe.times(&w).iter().zip(&importance).map(|(s, i)| s * i).collect();
+        let got = by_sample.times(&sum);
+        for ((w, wanted), got) in w.iter_mut().zip(&wanted).zip(&got) {
+            if *got > 0.0 {
+                *w *= wanted / got;
+            }
+        }
+        stage.step(1)?;
+    }
+    Ok(w)
+}

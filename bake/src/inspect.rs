@@ -1,0 +1,65 @@
+//! `diaphane-bake inspect`.
+
+use diaphane_formats::asset::{self, Asset};
+use diaphane_formats::files;
+use serde_json::{Value, json};
+use std::path::Path;
+
+/// Prints what is in an asset.
+pub fn show(path: &Path, as_json: bool) -> anyhow::Result<()> {
+    let bytes = files::read(path)?;
+    let in_file = |e: diaphane_formats::Error| e.in_file(path);
+    let asset = asset::parse(&bytes).map_err(in_file)?;
+    let sections = asset::section_sizes(&bytes).map_err(in_file)?;
+    if as_json {
+        println!("{:#}", describe(&asset, &sections, bytes.len()));
+    } else {
+        print_text(path, &asset, &sections, bytes.len());
+    }
+    Ok(())
+}
+
+fn describe(asset: &Asset, sections: &[(&'static str, usize)], bytes: usize) -> Value {
+    let sizes: serde_json::Map<String, Value> = sections.iter().map(|(n, s)| ((*n).to_owned(), json!(s))).collect();
+    json!({
+        "format_version": asset::FORMAT_VERSION,
+        "bytes": bytes,
+        "bytes_per_sample": bytes_per_sample(asset, sections),
+        "sections": sizes,
+        "diagonal": asset.info.diagonal(),
+        "info": asset.info,
+    })
+}
+
+/// Average over the sections that grow with the samples.
+fn bytes_per_sample(asset: &Asset, sections: &[(&'static str, usize)]) -> f64 {
+    const PER_SAMPLE: [&str; 4] = ["position_radius", "weight", "depth", "boundary"];
+    let sum: usize = sections.iter().filter(|(n, _)| PER_SAMPLE.contains(n)).map(|(_, s)| s).sum();
+    sum as f64 / asset.samples.len().max(1) as f64
+}
+
+fn print_text(path: &Path, asset: &Asset, sections: &[(&'static str, usize)], bytes: usize) {
+    let i = &asset.info;
+    let p = &i.provenance;
+    println!("{}  {:.2} MB, format {}", path.display(), bytes as f64 / 1e6, asset::FORMAT_VERSION);
+    println!("  made by      {} from {} and {}, seed {}", p.program, p.mesh_name, p.material_name, p.seed);
+    println!("  mesh         {} vertices, {} triangles, diagonal {}", p.mesh_report.vertices, p.mesh_report.triangles, i.diagonal());
+    for line in p.mesh_report.warnings() {
+        println!("               {line}");
+    }
+    println!("  extinction   {:?} per mesh unit", i.extinction);
+    println!("  albedo       {:?}", i.albedo);
+    println!("  phase        {:?}, ior {}", i.phase, i.ior);
+    match &asset.density {
+        Some(g) => println!("  density      grid of {} x {} x {}", g.size[0], g.size[1], g.size[2]),
+        None => println!("  density      {} everywhere", i.uniform_density),
+    }
+    println!(
+        "  samples      {} ({} dropped as dark), {} directions, {} bands, {:?}, width factor {}",
+        i.samples, i.discarded, p.directions, i.order, i.encoding, i.width_factor
+    );
+    println!("  per sample   {:.1} bytes", bytes_per_sample(asset, sections));
+    for (name, size) in sections {
+        println!("    {name:<16} {size:>12} bytes");
+    }
+}

@@ -1,0 +1,80 @@
+//! What a user can choose about a bake.
+
+use crate::{Error, Result};
+use diaphane_formats::encoding::Encoding;
+use diaphane_formats::sh::MAX_ORDER;
+
+/// Parameters of a bake. [`Params::default`] is the preset `standard`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Params {
+    /// Stored samples, met within 5 %.
+    pub samples: usize,
+    /// Directions in which the optical depth of each sample is computed.
+    pub directions: usize,
+    /// Bands of spherical harmonics, 1..=10.
+    pub order: usize,
+    /// Seed of all random choices.
+    pub seed: u64,
+    /// What the harmonics represent.
+    pub encoding: Encoding,
+    /// Full width at half maximum of a kernel in disk radii.
+    pub width_factor: f32,
+}
+
+/// Directions used to estimate the fluence on the layers.
+pub const DENSITY_DIRECTIONS: usize = 64;
+
+/// Samples whose fluence, over 4π, stays below this are not stored.
+pub const DARK: f64 = 5e-3;
+
+/// The disk radius follows (κt Φ)^-EXPONENT.
+pub const RADIUS_EXPONENT: f64 = 0.3;
+
+/// Samples closer to the boundary than this many radii are moved onto it.
+pub const BOUNDARY_SNAP: f64 = 0.3;
+
+/// Named sets of parameters.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Preset {
+    /// Seconds; for trying things out.
+    Draft,
+    /// The default.
+    Standard,
+    /// More directions and bands.
+    Fine,
+}
+
+impl Params {
+    /// The parameters of a preset.
+    pub fn preset(preset: Preset) -> Self {
+        let (samples, directions, order) = match preset {
+            Preset::Draft => (5_000, 96, 5),
+            Preset::Standard => (50_000, 256, 7),
+            Preset::Fine => (50_000, 512, 9),
+        };
+        Self { samples, directions, order, seed: 1, encoding: Encoding::RECIPROCAL, width_factor: 1.4 }
+    }
+
+    pub(crate) fn validate(&self) -> Result<()> {
+        let fail = |message: String| Err(Error::Parameter(message));
+        if !(1..=20_000_000).contains(&self.samples) {
+            return fail(format!("--samples must lie within 1..20000000, not {}", self.samples));
+        }
+        if !(1..=65_536).contains(&self.directions) {
+            return fail(format!("--directions must lie within 1..65536, not {}", self.directions));
+        }
+        if !(1..=MAX_ORDER).contains(&self.order) {
+            return fail(format!("--sh-order must lie within 1..{MAX_ORDER}, not {}", self.order));
+        }
+        if !(0.5..=4.0).contains(&self.width_factor) {
+            return fail(format!("the width factor must lie within 0.5..4, not {}", self.width_factor));
+        }
+        Ok(())
+    }
+}
+
+impl Default for Params {
+    fn default() -> Self {
+        Self::preset(Preset::Standard)
+    }
+}

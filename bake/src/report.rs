@@ -1,0 +1,70 @@
+//! What a bake did, for people and for `--report`.
+
+use crate::field::Shape;
+use crate::fit::Lit;
+use crate::layers::Layer;
+use crate::params::Params;
+use diaphane_formats::asset::{Asset, encode};
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// The report of one bake.
+#[derive(Clone, Debug, Serialize)]
+pub struct Report {
+    /// Stored samples.
+    pub samples: usize,
+    /// Directions for each sample.
+    pub directions: usize,
+    /// Bands of spherical harmonics.
+    pub sh_order: usize,
+    /// Depths computed for the samples.
+    pub rays: u64,
+    /// Seconds of each stage, in order of name; `total` is their sum.
+    pub seconds: BTreeMap<String, f64>,
+    /// Size of the asset file.
+    pub bytes: usize,
+    /// Seed of all random choices.
+    pub seed: u64,
+    /// Samples dropped after placing because they turned out dark or outside.
+    pub discarded: usize,
+    /// Samples moved onto the boundary.
+    pub snapped: usize,
+    /// Offset layers.
+    pub layers: usize,
+    /// What was skipped because nothing needed it.
+    pub skipped: BTreeMap<String, usize>,
+    /// What was mended in the mesh, in sentences.
+    pub warnings: Vec<String>,
+}
+
+impl Report {
+    pub(crate) fn new(
+        params: &Params,
+        shape: &Shape<'_>,
+        layers: &[Layer],
+        lit: &Lit,
+        asset: &Asset,
+        stages: Vec<(&'static str, f64)>,
+    ) -> Self {
+        let mut seconds: BTreeMap<String, f64> = stages.iter().map(|(n, s)| ((*n).to_owned(), *s)).collect();
+        seconds.insert("total".to_owned(), stages.iter().map(|(_, s)| s).sum());
+        let skipped = BTreeMap::from([
+            ("distance_queries".to_owned(), shape.skipped_nodes),
+            ("dark_or_outside_candidates".to_owned(), lit.dark_candidates),
+        ]);
+        Self {
+            samples: lit.samples.len(),
+            directions: params.directions,
+            sh_order: params.order,
+            rays: lit.rays,
+            seconds,
+            bytes: encode(asset).map_or(0, |b| b.len()),
+            seed: params.seed,
+            discarded: lit.discarded,
+            snapped: lit.snapped,
+            layers: layers.len(),
+            skipped,
+            warnings: asset.info.provenance.mesh_report.warnings(),
+        }
+    }
+}

@@ -1,0 +1,167 @@
+//! Candidates on the layers and in the slabs beneath them.
+
+use super::Candidate;
+use crate::Result;
+use crate::density::LayerFluence;
+use crate::field::{Shape, inside_nodes};
+use crate::layers::Layer;
+use crate::params::{DARK, Params, RADIUS_EXPONENT};
+use diaphane_formats::directions::hash;
+use diaphane_formats::medium::Medium;
+use glam::DVec3;
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64Mcg;
+use rayon::prelude::*;
+
+/// Candidates for each wanted sample.
+const OVERSAMPLING: usize = 16;
+
+pub(super) struct Drawn {
+    pub list: Vec<Candidate>,
+    pub dark: usize,
+}
+
+/// One triangle of one layer with the mass of its slab.
+struct Patch {
+    layer: u32,
+    triangle: u32,
+    volume: f64,
+    /// κt-scaled fluence in the middle of the slab.
+    demand: f64,
+}
+
+pub(super) fn draw(
+    shape: &Shape<'_>,
+    layers: &[Layer],
+    fluence: &LayerFluence,
+    medium: &Medium,
+    params: &Params,
+) -> Result<Drawn> {
+    let patches = patches(layers, fluence, medium);
+    let mean = reference_demand(&patches);
+    let relative_radius = |demand: f64| (demand / mean).max(1e-12).powf(-RADIUS_EXPONENT).clamp(0.5, 2.0);
+    // Cumulative mass of the patches: expected number of samples, up to a common factor.
+    let mut cumulative = Vec::with_capacity(patches.len());
+    let mut total = 0.0;
+    for p in &patches {
+        total += p.volume / relative_radius(p.demand).powi(3);
+        cumulative.push(total);
+    }
+    if !(total > 0.0) {
+        return Ok(Drawn { list: Vec::new(), dark: 0 });
+    }
+    let wanted = OVERSAMPLING * params.samples + 64;
+    let seed = hash(params.seed, 23);
+    let mut list: Vec<Candidate> = (0..wanted)
+        .into_par_iter()
+        .map(|i| {
+            let mut rng = Pcg64Mcg::seed_from_u64(hash(seed, i as u64));
+            // Stratified over the cumulative mass, so that every patch gets its share.
+            let mass = (i as f64 + rng.random::<f64>()) / wanted as f64 * total;
+            let patch = &patches[cumulative.partition_point(|c| *c <= mass).min(patches.len() - 1)];
+            let layer = &layers[patch.layer as usize];
+            let corners = layer.triangles[patch.triangle as usize].map(|v| v as usize);
+            let bary = barycentric(rng.random(), rng.random());
+            let down: f64 = rng.random();
+            let mut position = DVec3::ZERO;
+            let mut inward = DVec3::ZERO;
+            let mut log_fluence = 0.0;
+            let (top, bottom) = (&fluence.top[patch.layer as usize], &fluence.bottom[patch.layer as usize]);
+            for (b, v) in bary.into_iter().zip(corners) {
+                position += layer.positions[v] * b;
+                inward += layer.inward[v] * b;
+                let log = |f: f32| f64::from(f.max(1e-12)).ln();
+                log_fluence += b * (log(top[v]) * (1.0 - down) + log(bottom[v]) * down);
+            }
+            position += inward.normalize_or_zero() * (down * layer.thickness);
+            let fluence = log_fluence.exp();
+            let radius = relative_radius(medium.density(position) * fluence);
+            Candidate { position, radius, fluence }
+        })
+        .collect();
+    list.extend(fill(shape, &list, layers));
+    let before = list.len();
+    let keep = usable(shape, medium, &list)?;
+    let mut kept: Vec<(u64, Candidate)> = list
+        .into_iter()
+        .zip(keep)
+        .enumerate()
+        .filter(|(_, (_, keep))| *keep)
+        .map(|(i, (c, _))| (hash(hash(params.seed, 29), i as u64), c))
+        .collect();
+    let dark = before - kept.len();
+    kept.sort_unstable_by_key(|(key, _)| *key);
+    Ok(Drawn { list: kept.into_iter().map(|(_, c)| c).collect(), dark })
+}
+
+fn patches(layers: &[Layer], fluence: &LayerFluence, medium: &Medium) -> Vec<Patch> {
+    let mut patches = Vec::new();
+    for (l, layer) in layers.iter().enumerate() {
+        for (t, corners) in layer.triangles.iter().enumerate() {
+            let [a, b, c] = corners.map(|v| layer.positions[v as usize]);
+            let mean = |values: &[f32]| corners.iter().map(|v| f64::from(values[*v as usize])).sum::<f64>() / 3.0;
+            let light = 0.5 * (mean(&fluence.top[l]) + mean(&fluence.bottom[l]));
+            if mean(&fluence.top[l]).max(mean(&fluence.bottom[l])) < DARK {
+                continue;
+            }
+            let rho = medium.density((a + b + c) / 3.0);
+            patches.push(Patch {
+                layer: l as u32,
+                triangle: t as u32,
+                volume: 0.5 * (b - a).cross(c - a).length() * layer.thickness,
+                demand: rho * light,
+            });
+        }
+    }
+    patches
+}
+
+/// Volume-weighted geometric mean of the demand: the demand that gets the mean radius.
+fn reference_demand(patches: &[Patch]) -> f64 {
+    let volume: f64 = patches.iter().map(|p| p.volume).sum();
+    let sum: f64 = patches.iter().map(|p| p.volume * p.demand.max(1e-12).ln()).sum();
+    if volume > 0.0 { (sum / volume).exp() } else { 1.0 }
+}
+
+fn barycentric(u: f64, v: f64) -> [f64; 3] {
+    let root = u.sqrt();
+    [1.0 - root, root * (1.0 - v), root * v]
+}
+
+/// Nodes of the distance grid that lie inside, with the radius and light of the nearest slab's mean: offered last, so
+/// that they only close holes which the layers left.
+fn fill(shape: &Shape<'_>, drawn: &[Candidate], layers: &[Layer]) -> Vec<Candidate> {
+    if layers.is_empty() {
+        return Vec::new();
+    }
+    // Mean radius and light by depth, in bins of one grid cell.
+    let grid = &shape.grid;
+    let bin = |depth: f64| (depth / grid.cell).max(0.0) as usize;
+    let deepest = grid.depth.iter().copied().fold(0.0, f32::max);
+    let mut sums = vec![(0.0, 0.0, 0.0); bin(f64::from(deepest)) + 2];
+    let last = sums.len() - 1;
+    for c in drawn.iter().step_by(7) {
+        if let Some(depth) = grid.depth_near(c.position) {
+            let s = &mut sums[bin(depth).min(last)];
+            *s = (s.0 + 1.0, s.1 + c.radius, s.2 + c.fluence);
+        }
+    }
+    (0..grid.depth.len())
+        .filter(|&i| grid.depth[i] > 0.0)
+        .filter_map(|i| {
+            let (n, radius, light) = sums[bin(f64::from(grid.depth[i])).min(last)];
+            (n > 0.0).then(|| Candidate { position: grid.node(i), radius: radius / n, fluence: light / n })
+        })
+        .collect()
+}
+
+/// Candidates that are inside, lit and where something scatters.
+fn usable(shape: &Shape<'_>, medium: &Medium, list: &[Candidate]) -> Result<Vec<bool>> {
+    let points: Vec<DVec3> = list.iter().map(|c| c.position).collect();
+    let inside = inside_nodes(shape.mesh, &points)?;
+    Ok(list
+        .par_iter()
+        .zip(inside)
+        .map(|(c, inside)| inside && c.fluence >= DARK && medium.density_and_scattering(c.position).1 > 0.0)
+        .collect())
+}

@@ -1,0 +1,84 @@
+//! Poisson-disk samples over the layers and the slabs between them (thesis section 3.2.4).
+//!
+//! Candidates are drawn on the layers' triangles, moved a random part of the slab inwards, in proportion to
+//! 1/radius³; darts in random order keep those that respect the disks of all kept before, by a hash grid in constant
+//! time each; a fill pass offers the nodes of the distance grid, so that no hole remains. The overall scale of the
+//! radii is found by repeating this with the same candidates until the wanted number is met.
+
+mod candidates;
+mod darts;
+
+use crate::density::LayerFluence;
+use crate::field::Shape;
+use crate::layers::Layer;
+use crate::params::{BOUNDARY_SNAP, Params};
+use crate::progress::Stage;
+use crate::{Error, Result};
+use diaphane_formats::medium::Medium;
+use glam::DVec3;
+use rayon::prelude::*;
+
+/// A possible or chosen sample.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Candidate {
+    pub position: DVec3,
+    /// Disk radius; before placing relative to the common scale, in 1/2..2.
+    pub radius: f64,
+    /// Φ/4π interpolated from the layers.
+    pub fluence: f64,
+}
+
+/// Where the samples are.
+pub(crate) struct Placed {
+    pub samples: Vec<Candidate>,
+    /// Random inside points with the samples' distribution, for fitting weights.
+    pub probes: Vec<Candidate>,
+    /// Samples that were moved onto the boundary.
+    pub snapped: usize,
+    /// Candidates without light or scattering that were left out.
+    pub dark: usize,
+}
+
+/// Inside points for each sample when weights are fitted.
+const PROBES_PER_SAMPLE: usize = 8;
+
+pub(crate) fn place(
+    shape: &Shape<'_>,
+    layers: &[Layer],
+    fluence: &LayerFluence,
+    medium: &Medium,
+    params: &Params,
+    stage: Stage<'_>,
+) -> Result<Placed> {
+    let drawn = candidates::draw(shape, layers, fluence, medium, params)?;
+    if drawn.list.is_empty() {
+        return Err(Error::NoRoom("no light reaches its inside, or nothing there scatters".to_owned()));
+    }
+    stage.expect(8);
+    let mut samples = darts::throw_to_count(shape, &drawn.list, params.samples, &stage)?;
+    let snapped = snap_to_boundary(shape, &mut samples);
+    let probes = drawn.list.iter().take(PROBES_PER_SAMPLE * samples.len()).copied().collect();
+    Ok(Placed { samples, probes, snapped, dark: drawn.dark })
+}
+
+/// Moves samples close to the boundary onto it, just inside, and rounds all positions to what the asset stores.
+fn snap_to_boundary(shape: &Shape<'_>, samples: &mut [Candidate]) -> usize {
+    let (low, high) = shape.mesh.bounds();
+    let centre = 0.5 * (low + high);
+    let margin = 1e-5 * shape.diagonal;
+    samples
+        .par_iter_mut()
+        .map(|s| {
+            let reach = (BOUNDARY_SNAP * s.radius).max(2.0 * margin);
+            let mut moved = 0;
+            if let Some(n) = shape.accel.nearest(s.position, reach) {
+                // Along the way from the surface to the sample, so that edges and corners work too.
+                let inward = (s.position - n.point).try_normalize().unwrap_or(-shape.accel.normal(n.triangle));
+                s.position = n.point + inward * margin;
+                moved = 1;
+            }
+            s.position = (s.position - centre).as_vec3().as_dvec3() + centre;
+            moved
+        })
+        .sum()
+}
