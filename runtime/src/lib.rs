@@ -7,8 +7,12 @@
 //! ```
 
 pub mod cpu;
+pub mod exact;
 pub mod frame;
+pub mod framing;
+pub mod player;
 pub mod rendered;
+pub mod usable;
 
 mod error;
 

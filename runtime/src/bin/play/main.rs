@@ -1,2 +1,32 @@
-//! Placeholder.
-fn main() {}
+//! `diaphane-play`: opens an asset in a window, or draws one picture of it.
+
+mod args;
+mod headless;
+mod stats;
+
+use anyhow::Result;
+use args::Args;
+use clap::Parser;
+use std::path::Path;
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    env_logger::Builder::from_env(env_logger::Env::default().default_filter_or("error")).init();
+    let args = Args::parse();
+    let done = match &args.output {
+        Some(output) => headless::run(&args, output),
+        None => open_window(&args.asset),
+    };
+    match done {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            // One line, whatever a message quotes.
+            eprintln!("error: {}", format!("{error:#}").replace(['\n', '\r'], " "));
+            ExitCode::from(2)
+        }
+    }
+}
+
+fn open_window(_asset: &Path) -> Result<()> {
+    anyhow::bail!("this build has no window; name a picture to draw with --output")
+}

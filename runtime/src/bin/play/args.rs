@@ -1,0 +1,92 @@
+//! The command line.
+
+use clap::{Parser, ValueEnum};
+use diaphane_runtime::player::{Backend, LightMode};
+use std::path::PathBuf;
+
+const EXAMPLES: &str = "\
+Examples:
+  diaphane-play statue.dph
+      opens the window
+  diaphane-play statue.dph --output statue.png
+      draws the asset in a default scene: from 45 degrees above, three lights
+  diaphane-play statue.dph --scene side.scene.toml --output side.exr
+      linear radiance with coverage in alpha
+  diaphane-play statue.dph --scene side.scene.toml --output side.exr --frames 20 --stats side.json
+      draws the frame 20 times, every pass anew, and writes timings
+  diaphane-play lamp.dph --scene inside.scene.toml --output inside.exr --light auto
+      traces rays to lights that stand inside the object";
+
+/// Plays a baked translucent asset in a window, or draws one picture of it.
+#[derive(Debug, Parser)]
+#[command(name = "diaphane-play", version, after_help = EXAMPLES)]
+pub struct Args {
+    /// The baked asset (*.dph)
+    pub asset: PathBuf,
+    /// Camera, image, surface and lights (*.scene.toml); without it the asset is framed from 45 degrees above
+    #[arg(long, value_name = "S.toml")]
+    pub scene: Option<PathBuf>,
+    /// Draw one picture to this file (.exr: linear radiance, coverage in alpha; .png: to look at) and quit; without
+    /// it the window opens
+    #[arg(long, value_name = "IMG")]
+    pub output: Option<PathBuf>,
+    /// What draws
+    #[arg(long, value_enum, default_value_t = BackendArg::Auto)]
+    pub backend: BackendArg,
+    /// Depth from the samples to the lights: baked, exact (rays to every light of the scene) or auto (rays to lights
+    /// inside the object's bounding box). Headless default: baked; in the window: auto
+    #[arg(long, value_enum)]
+    pub light: Option<LightArg>,
+    /// Draw the frame this many times, for timings
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1_000_000),
+          requires = "output")]
+    pub frames: u32,
+    /// Keep what has not changed from frame to frame instead of redoing every pass
+    #[arg(long, requires = "output")]
+    pub reuse: bool,
+    /// Write counts and timings as JSON to this file
+    #[arg(long, value_name = "S.json", requires = "output")]
+    pub stats: Option<PathBuf>,
+}
+
+/// [`Backend`] on the command line.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub enum BackendArg {
+    /// The GPU where there is one, else the CPU
+    Auto,
+    /// The GPU, or an error
+    Gpu,
+    /// The CPU
+    Cpu,
+}
+
+impl From<BackendArg> for Backend {
+    fn from(arg: BackendArg) -> Self {
+        match arg {
+            BackendArg::Auto => Self::Auto,
+            BackendArg::Gpu => Self::Gpu,
+            BackendArg::Cpu => Self::Cpu,
+        }
+    }
+}
+
+/// [`LightMode`] on the command line.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub enum LightArg {
+    /// Baked depths
+    Baked,
+    /// Rays to every light of the scene
+    Exact,
+    /// Rays to lights inside the bounding box
+    Auto,
+}
+
+impl From<LightArg> for LightMode {
+    fn from(arg: LightArg) -> Self {
+        match arg {
+            LightArg::Baked => Self::Baked,
+            LightArg::Exact => Self::Exact,
+            LightArg::Auto => Self::Auto,
+        }
+    }
+}

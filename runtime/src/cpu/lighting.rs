@@ -1,0 +1,147 @@
+//! Light that each sample scatters towards the camera.
+//!
+//! Per channel, with E_l the irradiance and ω_l the direction of light l at the sample's place b, Ω the albedo:
+//!
+//!   v(b) = Ω Σ_l p(cos_l) E_l(b) ψ(b, ω_l) β(b, ω_l),   cos_l = dot(-ω_l, normalize(camera - b))
+//!
+//! v is the source of [`diaphane_formats::reconstruct`]: in-scattered radiance per unit of κt dt, albedo included.
+//! ψ = exp(-κ/κ̄ · τ̄) with τ̄ decoded from the sample's spherical harmonics (κ̄ = 0: ψ = 1); β is the boundary's
+//! Fresnel transmittance from its own coefficients, clamped to 0..1 (index matched: 1). A table of exact depths m
+//! gives ψ = exp(-κ m) and β instead. Lights that do not reach the sample (outside a spot's cone) are skipped.
+
+use crate::exact::ExactDepths;
+use crate::frame::{Frame, FrameLight, LightKind};
+use diaphane_formats::asset::{Asset, Samples};
+use diaphane_formats::encoding::Encoding;
+use diaphane_formats::sh::{self, MAX_ORDER};
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
+
+/// What the lighting pass needs of an asset beside the samples themselves.
+#[derive(Clone, Copy, Debug)]
+pub struct Lighting {
+    /// κ at density 1, per channel.
+    extinction: Vec3,
+    /// κ/κ̄ per channel; `None` when κ̄ is 0.
+    ratio: Option<Vec3>,
+    albedo: Vec3,
+    /// Mean cosine of the phase function.
+    g: f32,
+    encoding: Encoding,
+    order: usize,
+}
+
+/// A light with the basis of its direction, where that is the same for all samples.
+struct Prepared<'a> {
+    light: &'a FrameLight,
+    basis: Option<Vec<f32>>,
+    exact: Option<&'a [[f32; 2]]>,
+}
+
+impl Lighting {
+    /// Parameters of an asset.
+    pub fn new(asset: &Asset) -> Self {
+        let info = &asset.info;
+        let extinction = DVec3::from(info.extinction);
+        let reference = info.reference_extinction;
+        Self {
+            extinction: extinction.as_vec3(),
+            ratio: (reference > 0.0).then(|| (extinction / reference).as_vec3()),
+            albedo: DVec3::from(info.albedo).as_vec3(),
+            g: info.phase.mean_cosine() as f32,
+            encoding: info.encoding,
+            order: info.order as usize,
+        }
+    }
+
+    /// The source of every sample, in the samples' order; parallel over samples.
+    pub fn sources(&self, samples: &Samples, frame: &Frame, exact: Option<&ExactDepths>) -> Vec<Vec3> {
+        let lights: Vec<Prepared> =
+            frame.lights.iter().enumerate().map(|(l, light)| self.prepare(l, light, samples, exact)).collect();
+        (0..samples.len())
+            .into_par_iter()
+            .with_min_len(256)
+            .map(|i| self.source(samples, i, frame, &lights))
+            .collect()
+    }
+
+    fn prepare<'a>(
+        &self,
+        index: usize,
+        light: &'a FrameLight,
+        samples: &Samples,
+        exact: Option<&'a ExactDepths>,
+    ) -> Prepared<'a> {
+        let table = exact.and_then(|e| e.light(index)).filter(|t| t.len() == samples.len());
+        let basis = (light.kind == LightKind::Directional).then(|| {
+            let mut basis = vec![0.0; self.order * self.order];
+            sh::evaluate_f32(self.order, (-light.direction).to_array(), &mut basis);
+            basis
+        });
+        Prepared { light, basis, exact: table }
+    }
+
+    fn source(&self, samples: &Samples, i: usize, frame: &Frame, lights: &[Prepared]) -> Vec3 {
+        let place = samples.position(i);
+        let towards_camera = (frame.view.origin - place).normalize_or_zero();
+        let count = self.order * self.order;
+        let depth = &samples.depth[i * count..(i + 1) * count];
+        let boundary = samples.boundary.get(i * count..(i + 1) * count);
+        let mut scratch = [0.0; MAX_ORDER * MAX_ORDER];
+        let mut sum = Vec3::ZERO;
+        for prepared in lights {
+            let (to, _, irradiance) = prepared.light.at(place, frame.least_distance);
+            if irradiance == Vec3::ZERO {
+                continue;
+            }
+            let arriving = match prepared.exact {
+                Some(table) => {
+                    let [length, boundary] = table[i];
+                    (-self.extinction * length).exp() * boundary
+                }
+                None => {
+                    let basis: &[f32] = match &prepared.basis {
+                        Some(basis) => basis,
+                        None => {
+                            sh::evaluate_f32(self.order, to.to_array(), &mut scratch);
+                            &scratch[..count]
+                        }
+                    };
+                    self.arriving(depth, boundary, basis)
+                }
+            };
+            sum += irradiance * arriving * henyey_greenstein(self.g, -to.dot(towards_camera));
+        }
+        sum * self.albedo
+    }
+
+    /// ψ β from the coefficients, per channel, 0..1.
+    fn arriving(&self, depth: &[f32], boundary: Option<&[f32]>, basis: &[f32]) -> Vec3 {
+        let through = boundary.map_or(1.0, |b| dot(b, basis).clamp(0.0, 1.0));
+        let Some(ratio) = self.ratio else { return Vec3::splat(through) };
+        let tau = self.encoding.decode(dot(depth, basis));
+        if tau == f32::INFINITY || through == 0.0 {
+            return Vec3::ZERO;
+        }
+        if ratio == Vec3::ONE { Vec3::splat((-tau).exp() * through) } else { (-ratio * tau).exp() * through }
+    }
+}
+
+/// Henyey-Greenstein's function in single precision, the formula of [`diaphane_formats::phase`].
+fn henyey_greenstein(g: f32, cosine: f32) -> f32 {
+    let base = ((1.0 - g) * (1.0 - g) + 2.0 * g * (1.0 - cosine)).max(1e-12);
+    (1.0 - g * g) / (4.0 * std::f32::consts::PI * base * base.sqrt())
+}
+
+/// Four running sums keep the additions independent of each other.
+fn dot(a: &[f32], b: &[f32]) -> f32 {
+    let mut sums = [0.0f32; 4];
+    let ((head_a, tail_a), (head_b, tail_b)) = (a.as_chunks::<4>(), b.as_chunks::<4>());
+    for (x, y) in head_a.iter().zip(head_b) {
+        for k in 0..4 {
+            sums[k] += x[k] * y[k];
+        }
+    }
+    let tail: f32 = tail_a.iter().zip(tail_b).map(|(x, y)| x * y).sum();
+    (sums[0] + sums[1]) + (sums[2] + sums[3]) + tail
+}

@@ -1,0 +1,121 @@
+//! Short ways to say what wgpu wants at length: layouts, bind groups, buffers and pipelines.
+
+use wgpu::util::DeviceExt;
+use wgpu::{
+    BindGroup, BindGroupDescriptor, BindGroupEntry, BindGroupLayout, BindGroupLayoutDescriptor, BindGroupLayoutEntry,
+    BindingResource, BindingType, Buffer, BufferBindingType, BufferDescriptor, BufferUsages, ComputePipeline,
+    ComputePipelineDescriptor, Device, PipelineCompilationOptions, PipelineLayout, PipelineLayoutDescriptor,
+    ShaderModule, ShaderStages, TextureSampleType, TextureViewDimension,
+};
+
+/// What a shader sees at a binding.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Slot {
+    /// A uniform buffer.
+    Uniform,
+    /// A uniform buffer whose offset is given when the group is set.
+    Moving,
+    /// A storage buffer that is read.
+    Read,
+    /// A storage buffer that is written.
+    Write,
+    /// A texture of f32 that is loaded from, not filtered.
+    Texture,
+}
+
+impl Slot {
+    fn binding_type(self) -> BindingType {
+        let buffer = |ty, has_dynamic_offset| BindingType::Buffer { ty, has_dynamic_offset, min_binding_size: None };
+        match self {
+            Self::Uniform => buffer(BufferBindingType::Uniform, false),
+            Self::Moving => buffer(BufferBindingType::Uniform, true),
+            Self::Read => buffer(BufferBindingType::Storage { read_only: true }, false),
+            Self::Write => buffer(BufferBindingType::Storage { read_only: false }, false),
+            Self::Texture => BindingType::Texture {
+                sample_type: TextureSampleType::Float { filterable: false },
+                view_dimension: TextureViewDimension::D2,
+                multisampled: false,
+            },
+        }
+    }
+}
+
+/// A layout with bindings 0, 1, ... for all `stages`. A slot that the fragment stage writes is hidden from the vertex
+/// stage, which may not see it.
+pub(super) fn layout(device: &Device, label: &str, stages: ShaderStages, slots: &[Slot]) -> BindGroupLayout {
+    let entries: Vec<BindGroupLayoutEntry> = slots
+        .iter()
+        .enumerate()
+        .map(|(i, slot)| BindGroupLayoutEntry {
+            binding: i as u32,
+            visibility: if matches!(slot, Slot::Write) { stages & !ShaderStages::VERTEX } else { stages },
+            ty: slot.binding_type(),
+            count: None,
+        })
+        .collect();
+    device.create_bind_group_layout(&BindGroupLayoutDescriptor { label: Some(label), entries: &entries })
+}
+
+/// A group with `resources` at bindings 0, 1, ...
+pub(super) fn group(
+    device: &Device,
+    label: &str,
+    layout: &BindGroupLayout,
+    resources: Vec<BindingResource>,
+) -> BindGroup {
+    let entries: Vec<BindGroupEntry> = resources
+        .into_iter()
+        .enumerate()
+        .map(|(i, resource)| BindGroupEntry { binding: i as u32, resource })
+        .collect();
+    device.create_bind_group(&BindGroupDescriptor { label: Some(label), layout, entries: &entries })
+}
+
+/// The layout of a pass: the common group and its own.
+pub(super) fn pipeline_layout(
+    device: &Device,
+    label: &str,
+    common: &BindGroupLayout,
+    own: &BindGroupLayout,
+) -> PipelineLayout {
+    device.create_pipeline_layout(&PipelineLayoutDescriptor {
+        label: Some(label),
+        bind_group_layouts: &[Some(common), Some(own)],
+        immediate_size: 0,
+    })
+}
+
+/// Constants of a pipeline as overrides of the shader.
+pub(super) fn options<'a>(constants: &'a [(&'a str, f64)]) -> PipelineCompilationOptions<'a> {
+    PipelineCompilationOptions { constants, ..Default::default() }
+}
+
+/// A compute pipeline.
+pub(super) fn compute(
+    device: &Device,
+    label: &str,
+    layout: &PipelineLayout,
+    module: &ShaderModule,
+    constants: &[(&str, f64)],
+) -> ComputePipeline {
+    device.create_compute_pipeline(&ComputePipelineDescriptor {
+        label: Some(label),
+        layout: Some(layout),
+        module,
+        entry_point: None,
+        compilation_options: options(constants),
+        cache: None,
+    })
+}
+
+/// An uninitialised (zero) buffer of at least 16 bytes.
+pub(super) fn empty_buffer(device: &Device, label: &str, size: u64, usage: BufferUsages) -> Buffer {
+    device.create_buffer(&BufferDescriptor { label: Some(label), size: size.max(16), usage, mapped_at_creation: false })
+}
+
+/// A buffer that holds `data`; at least 16 bytes, because shaders cannot bind nothing.
+pub(super) fn filled_buffer<T: bytemuck::Pod>(device: &Device, label: &str, data: &[T], usage: BufferUsages) -> Buffer {
+    let bytes: &[u8] = bytemuck::cast_slice(data);
+    let contents = if bytes.len() < 16 { &[bytes, &[0; 16]].concat() } else { bytes };
+    device.create_buffer_init(&wgpu::util::BufferInitDescriptor { label: Some(label), contents, usage })
+}

@@ -1,0 +1,200 @@
+//! Plain data shared with the shaders. Layouts follow WGSL's rules: a vector of three starts at a multiple of 16 and
+//! the scalar after it fills its last four bytes. The tests check sizes and places against the shaders' source.
+
+use crate::frame::{Frame, FrameLight};
+use bytemuck::{Pod, Zeroable};
+use diaphane_formats::asset::Asset;
+use diaphane_formats::encoding::Encoding;
+use glam::{DVec3, Vec3};
+
+use super::tiles::Tile;
+
+/// Extinction in single precision is clamped here, as on the CPU.
+const MOST_EXTINCTION: f64 = 1e30;
+
+/// Surface nearer to the camera than this fraction of the diagonal is not seen.
+const NEAR: f32 = 1e-5;
+
+/// `View` of shared/view.wgsl.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+pub(super) struct ViewUniform {
+    pub origin: Vec3,
+    pub width: u32,
+    pub forward: Vec3,
+    pub height: u32,
+    pub right: Vec3,
+    pub light_count: u32,
+    pub up: Vec3,
+    pub scene_lights: u32,
+    pub tile_start: [u32; 2],
+    pub tile_size: [u32; 2],
+    pub offset: [f32; 2],
+    pub near: f32,
+    pub least_distance: f32,
+    pub specular: f32,
+    pub alpha: f32,
+    pub unused: [u32; 2],
+}
+
+impl ViewUniform {
+    /// A frame's rays at `offset` inside the pixels of `tile`.
+    pub fn new(frame: &Frame, diagonal: f32, tile: Tile, offset: [f32; 2]) -> Self {
+        let surface = &frame.surface;
+        Self {
+            origin: frame.view.origin,
+            width: frame.width,
+            forward: frame.view.forward,
+            height: frame.height,
+            right: frame.view.right,
+            light_count: frame.lights.len() as u32,
+            up: frame.view.up,
+            scene_lights: frame.scene_lights as u32,
+            tile_start: tile.start,
+            tile_size: tile.size,
+            offset,
+            near: NEAR * diagonal,
+            least_distance: frame.least_distance,
+            specular: if surface.reflection { surface.specular as f32 } else { 0.0 },
+            alpha: (surface.roughness as f32).max(crate::cpu::surface::LEAST_ROUGHNESS).powi(2),
+            unused: [0; 2],
+        }
+    }
+}
+
+/// `Medium` of shared/medium.wgsl.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+pub(super) struct MediumUniform {
+    pub kappa: Vec3,
+    pub order: u32,
+    pub extinction: Vec3,
+    pub samples: u32,
+    pub ratio: Vec3,
+    pub encoding: u32,
+    pub albedo: Vec3,
+    pub epsilon: f32,
+    pub grid_min: Vec3,
+    pub mean_cosine: f32,
+    pub grid_max: Vec3,
+    pub ior: f32,
+    pub grid_size: [u32; 3],
+    pub triangles: u32,
+}
+
+impl MediumUniform {
+    /// An asset's medium.
+    pub fn new(asset: &Asset) -> Self {
+        let info = &asset.info;
+        let extinction = DVec3::from(info.extinction);
+        let along = if asset.density.is_some() { extinction } else { extinction * info.uniform_density };
+        let reference = info.reference_extinction;
+        let (encoding, epsilon) = match info.encoding {
+            Encoding::Transmittance => (0, 0.0),
+            Encoding::Reciprocal { epsilon } => (1, epsilon),
+        };
+        let grid = asset.density.as_ref();
+        Self {
+            kappa: along.min(DVec3::splat(MOST_EXTINCTION)).as_vec3(),
+            order: info.order,
+            extinction: extinction.as_vec3(),
+            samples: asset.samples.len() as u32,
+            ratio: if reference > 0.0 { (extinction / reference).as_vec3() } else { Vec3::ZERO },
+            encoding,
+            albedo: DVec3::from(info.albedo).as_vec3(),
+            epsilon,
+            grid_min: grid.map_or(Vec3::ZERO, |g| g.min.into()),
+            mean_cosine: info.phase.mean_cosine() as f32,
+            grid_max: grid.map_or(Vec3::ONE, |g| g.max.into()),
+            ior: info.ior as f32,
+            grid_size: grid.map_or([1; 3], |g| g.size),
+            triangles: asset.mesh_triangles.len() as u32,
+        }
+    }
+
+    /// Whether all channels attenuate alike.
+    pub fn is_grey(&self) -> bool {
+        self.kappa.x == self.kappa.y && self.kappa.y == self.kappa.z
+    }
+}
+
+/// `Light` of shared/light.wgsl.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+pub(super) struct LightRecord {
+    pub position: Vec3,
+    pub kind: u32,
+    pub direction: Vec3,
+    pub cos_inner: f32,
+    pub colour: Vec3,
+    pub cos_outer: f32,
+    pub table: u32,
+    pub unused: [u32; 3],
+}
+
+impl LightRecord {
+    /// A light, and its exact depth table if it has one.
+    pub fn new(light: &FrameLight, table: Option<u32>) -> Self {
+        Self {
+            position: light.position,
+            kind: light.kind as u32,
+            direction: light.direction,
+            cos_inner: light.cos_inner,
+            colour: light.colour,
+            cos_outer: light.cos_outer,
+            table: table.unwrap_or(u32::MAX),
+            unused: [0; 3],
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::mem::{offset_of, size_of};
+
+    /// Fields of a WGSL struct with WGSL's offsets, and its size.
+    fn wgsl(source: &str, name: &str) -> (Vec<(String, usize)>, usize) {
+        let body = source.split(&format!("struct {name} {{")).nth(1).unwrap().split('}').next().unwrap();
+        let (mut at, mut align_all, mut fields) = (0usize, 4, Vec::new());
+        for line in body.lines() {
+            let line = line.split("//").next().unwrap().trim().trim_end_matches(',');
+            let Some((field, kind)) = line.split_once(':') else { continue };
+            let (align, size) = match kind.trim() {
+                "vec3f" | "vec3u" => (16, 12),
+                "vec2f" | "vec2u" => (8, 8),
+                "f32" | "u32" => (4, 4),
+                other => panic!("{other}"),
+            };
+            at = at.next_multiple_of(align);
+            align_all = align_all.max(align);
+            fields.push((field.trim().to_owned(), at));
+            at += size;
+        }
+        (fields, at.next_multiple_of(align_all))
+    }
+
+    macro_rules! mirrors {
+        ($rust:ident, $file:literal, $name:literal, $($field:ident),*) => {
+            let (fields, size) = wgsl(include_str!(concat!("../shaders/shared/", $file)), $name);
+            let ours = vec![$((stringify!($field).to_owned(), offset_of!($rust, $field))),*];
+            assert_eq!(fields, ours);
+            assert_eq!(size, size_of::<$rust>());
+        };
+    }
+
+    #[test]
+    fn structs_lie_as_the_shaders_read_them() {
+        mirrors!(
+            ViewUniform, "view.wgsl", "View", origin, width, forward, height, right, light_count, up, scene_lights,
+            tile_start, tile_size, offset, near, least_distance, specular, alpha
+        );
+        mirrors!(
+            MediumUniform, "medium.wgsl", "Medium", kappa, order, extinction, samples, ratio, encoding, albedo,
+            epsilon, grid_min, mean_cosine, grid_max, ior, grid_size, triangles
+        );
+        mirrors!(
+            LightRecord, "light.wgsl", "Light", position, kind, direction, cos_inner, colour, cos_outer, table
+        );
+    }
+}

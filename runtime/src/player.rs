@@ -1,0 +1,137 @@
+//! One renderer, whichever backend draws: what the command line, the window and the validation call.
+
+use crate::Result;
+use crate::cpu::CpuRenderer;
+use crate::exact::{DepthTracer, ExactDepths};
+use crate::frame::Frame;
+use crate::rendered::Rendered;
+use diaphane_formats::asset::{Asset, Info};
+use std::time::Instant;
+
+/// Which backend to use.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Backend {
+    /// The GPU where there is one, the CPU otherwise.
+    #[default]
+    Auto,
+    /// The GPU or an error.
+    Gpu,
+    /// The CPU.
+    Cpu,
+}
+
+/// Where the optical depth from the samples to the lights comes from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum LightMode {
+    /// The baked spherical harmonics, which run to infinity.
+    #[default]
+    Baked,
+    /// Rays to every light of the scene (those of the environment stay baked).
+    Exact,
+    /// Rays to lights inside the object's bounding box, baked depths for the others.
+    Auto,
+}
+
+/// The backend at work.
+enum Engine {
+    Cpu(Box<CpuRenderer>),
+}
+
+/// Plays one asset.
+pub struct Player {
+    engine: Engine,
+    note: Option<String>,
+    info: Info,
+    tracer: DepthTracer,
+    reuse: bool,
+    last: Option<(Frame, LightMode, Rendered)>,
+}
+
+impl Player {
+    /// Prepares an asset on a backend. [`Backend::Auto`] falls back to the CPU and says why in [`Player::note`].
+    ///
+    /// # Errors
+    /// An asset that makes no sense; no GPU where one is demanded.
+    pub fn new(asset: &Asset, backend: Backend) -> Result<Self> {
+        let (engine, note) = open(asset, backend)?;
+        let tracer = DepthTracer::new(asset)?;
+        Ok(Self { engine, note, info: asset.info.clone(), tracer, reuse: false, last: None })
+    }
+
+    /// Why the backend is not the one that would have been preferred.
+    pub fn note(&self) -> Option<&str> {
+        self.note.as_deref()
+    }
+
+    /// The backend ("gpu" or "cpu") and the adapter's name.
+    pub fn describe(&self) -> (&'static str, String) {
+        match &self.engine {
+            Engine::Cpu(_) => ("cpu", format!("{} threads", rayon::current_num_threads())),
+        }
+    }
+
+    /// Whether later frames may keep what an unchanged frame computed before. Off at first: every frame redoes every
+    /// pass.
+    pub fn set_reuse(&mut self, reuse: bool) {
+        self.reuse = reuse;
+    }
+
+    /// The asset's parameters.
+    pub fn info(&self) -> &Info {
+        &self.info
+    }
+
+    /// Draws a frame. Where an unchanged frame is reused the list of passes is empty.
+    ///
+    /// # Errors
+    /// The GPU failed.
+    pub fn render(&mut self, frame: &Frame, mode: LightMode) -> Result<Rendered> {
+        if self.reuse
+            && let Some((last, last_mode, rendered)) = &self.last
+            && last == frame
+            && *last_mode == mode
+        {
+            return Ok(Rendered { passes: Vec::new(), ..rendered.clone() });
+        }
+        let started = Instant::now();
+        let exact = self.exact(frame, mode);
+        let exact_ms = started.elapsed().as_secs_f64() * 1e3;
+        let mut rendered = match &mut self.engine {
+            Engine::Cpu(cpu) => cpu.render(frame, exact.as_ref()),
+        };
+        if exact.is_some() {
+            rendered.passes.insert(0, ("exact depths", exact_ms));
+        }
+        if self.reuse {
+            self.last = Some((frame.clone(), mode, rendered.clone()));
+        }
+        Ok(rendered)
+    }
+
+    /// The exact depths that `mode` asks for; `None` when the baked ones serve all lights.
+    fn exact(&mut self, frame: &Frame, mode: LightMode) -> Option<ExactDepths> {
+        let wanted = match mode {
+            LightMode::Baked => Vec::new(),
+            LightMode::Exact => (0..frame.scene_lights).collect(),
+            LightMode::Auto => frame.lights_inside(&self.info),
+        };
+        if wanted.is_empty() {
+            return None;
+        }
+        if !self.reuse {
+            self.tracer.forget();
+        }
+        Some(self.tracer.trace(frame, &wanted))
+    }
+}
+
+fn open(asset: &Asset, backend: Backend) -> Result<(Engine, Option<String>)> {
+    match backend {
+        Backend::Cpu => Ok((Engine::Cpu(Box::new(CpuRenderer::new(asset)?)), None)),
+        Backend::Gpu => Err(crate::Error::NoAdapter("this build has no GPU renderer".to_owned())),
+        Backend::Auto => {
+            let note = "this build has no GPU renderer; drawing on the CPU".to_owned();
+            Ok((Engine::Cpu(Box::new(CpuRenderer::new(asset)?)), Some(note)))
+        }
+    }
+}

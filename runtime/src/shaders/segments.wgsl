@@ -1,0 +1,87 @@
+// Segments pass: from each pixel's sorted crossings to at most four inside pieces, where the winding number is
+// positive. Twin of `visibility::inside_pieces`. Also starts the ray's counters and switches on the draws of the
+// pieces that occur.
+override FRESNEL: bool = false;
+
+const SLOTS: u32 = 8u;
+const STATE: u32 = 10u;
+const BOUNDARY: u32 = 12u;
+const MAX_PIECES: u32 = 4u;
+const ARGUMENTS: u32 = 8u; // draw (4), dispatch (3), unused
+
+@group(1) @binding(0) var<storage, read> crossings: array<u32>;
+@group(1) @binding(1) var<storage, read> boundary: array<f32>;
+// Piece k of pixel i at [k * stride + i]: start, end, transmittance of its entry and of its exit.
+@group(1) @binding(2) var<storage, read_write> pieces: array<vec4f>;
+// What lies in front of the next piece: transmittance per channel, and whether the ray met a kernel.
+@group(1) @binding(3) var<storage, read_write> front: array<vec4f>;
+@group(1) @binding(4) var<storage, read_write> radiance: array<vec4f>;
+// Rays that hit, pieces dropped, kernels, rays without a kernel.
+@group(1) @binding(5) var<storage, read_write> counters: array<vec4u>;
+@group(1) @binding(6) var<storage, read_write> arguments: array<atomic<u32>>;
+
+fn through(index: u32, slot: u32) -> f32 {
+    if (FRESNEL) {
+        return 1.0 - boundary[index * BOUNDARY + slot];
+    }
+    return 1.0;
+}
+
+@compute @workgroup_size(8, 8)
+fn segments(@builtin(global_invocation_id) pixel: vec3u) {
+    if (any(pixel.xy >= view.tile_size)) {
+        return;
+    }
+    let index = pixel_index(pixel.xy);
+    let stride = arrayLength(&pieces) / MAX_PIECES;
+    let state = index * STATE;
+    var winding = bitcast<i32>(crossings[state + SLOTS]);
+    let total = crossings[state + SLOTS + 1u];
+    var count = 0u;
+    var dropped = 0u;
+    var open = winding > 0;
+    var start = 0.0;
+    var entry = 1.0;
+    for (var slot = 0u; slot < min(total, SLOTS); slot++) {
+        let bits = ~crossings[state + slot];
+        let t = bitcast<f32>(bits & 0xfffffffeu);
+        winding += select(-1, 1, (bits & 1u) == 1u);
+        if (!open && winding > 0) {
+            open = true;
+            start = t;
+            entry = through(index, slot);
+        } else if (open && winding <= 0) {
+            open = false;
+            if (t > start) {
+                if (count < MAX_PIECES) {
+                    pieces[count * stride + index] = vec4f(start, t, entry, through(index, slot));
+                    count++;
+                } else {
+                    dropped++;
+                }
+            }
+        }
+    }
+    if (total > SLOTS) {
+        dropped += (total - SLOTS + 1u) / 2u;
+    }
+    for (var k = 0u; k < MAX_PIECES; k++) {
+        if (k >= count) {
+            pieces[k * stride + index] = vec4f(0.0);
+        } else if (atomicLoad(&arguments[k * ARGUMENTS]) == 0u) {
+            let groups = (view.tile_size + vec2u(7u)) / 8u;
+            atomicMax(&arguments[k * ARGUMENTS + 1u], medium.samples);
+            atomicMax(&arguments[k * ARGUMENTS + 4u], groups.x);
+            atomicMax(&arguments[k * ARGUMENTS + 5u], groups.y);
+            atomicMax(&arguments[k * ARGUMENTS + 6u], 1u);
+            atomicMax(&arguments[k * ARGUMENTS], 4u);
+        }
+    }
+    front[index] = vec4f(1.0, 1.0, 1.0, 0.0);
+    let hit = select(0u, 1u, count > 0u);
+    counters[index] += vec4u(hit, dropped, 0u, hit);
+    if (FRESNEL && total > 0u) {
+        let at = index * BOUNDARY + 8u;
+        radiance[index] += vec4f(boundary[at], boundary[at + 1u], boundary[at + 2u], 0.0);
+    }
+}

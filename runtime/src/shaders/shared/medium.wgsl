@@ -1,0 +1,19 @@
+// The asset's medium: mirrors `MediumUniform` in gpu/uniforms.rs.
+struct Medium {
+    kappa: vec3f,           // extinction along a ray, per unit of profile density, or absolute without a profile
+    order: u32,             // bands of the spherical harmonics
+    extinction: vec3f,      // per unit of density length
+    samples: u32,
+    ratio: vec3f,           // extinction over the reference extinction
+    encoding: u32,          // 0: transmittance, 1: reciprocal
+    albedo: vec3f,
+    epsilon: f32,           // of the reciprocal encoding
+    grid_min: vec3f,
+    mean_cosine: f32,       // of the phase function
+    grid_max: vec3f,
+    ior: f32,
+    grid_size: vec3u,
+    triangles: u32,
+}
+
+@group(0) @binding(1) var<uniform> medium: Medium;

@@ -1,0 +1,46 @@
+// Camera, tile and frame parameters: mirrors `ViewUniform` in gpu/uniforms.rs.
+struct View {
+    origin: vec3f,          // centre of projection, relative to the asset's centre
+    width: u32,             // of the whole picture, pixels
+    forward: vec3f,         // unit
+    height: u32,
+    right: vec3f,           // half the image plane's width at distance 1
+    light_count: u32,
+    up: vec3f,              // half the image plane's height at distance 1
+    scene_lights: u32,      // the first lights make highlights, the rest stand for an environment
+    tile_start: vec2u,      // column and row of the tile's first pixel
+    tile_size: vec2u,       // columns and rows of the tile
+    offset: vec2f,          // position of this ray inside its pixel, each in (0, 1)
+    near: f32,              // surface nearer than this is not seen
+    least_distance: f32,    // where the inverse square law is clamped
+    specular: f32,          // 0: no highlights
+    alpha: f32,             // squared roughness
+}
+
+@group(0) @binding(0) var<uniform> view: View;
+
+// Unit direction of the ray through `pixel` of the tile.
+fn ray_direction(pixel: vec2u) -> vec3f {
+    let at = vec2f(view.tile_start + pixel) + view.offset;
+    let sx = 2.0 * at.x / f32(view.width) - 1.0;
+    let sy = 1.0 - 2.0 * at.y / f32(view.height);
+    let d = view.forward + view.right * sx + view.up * sy;
+    return d * (1.0 / length(d));
+}
+
+// Where a pixel keeps its state.
+fn pixel_index(pixel: vec2u) -> u32 {
+    return pixel.y * view.tile_size.x + pixel.x;
+}
+
+// Clip coordinates in the tile, such that the ray of this pass through a pixel meets the pixel's centre.
+// `plane` holds the coordinates along `right` and `up` of a point at distance `depth` along `forward`.
+// The constant z puts the near plane at w = near and the far plane nowhere.
+fn tile_clip(plane: vec2f, depth: f32) -> vec4f {
+    let size = vec2f(view.tile_size);
+    let full = vec2f(f32(view.width), f32(view.height));
+    let shift = (vec2f(0.5) - view.offset) - vec2f(view.tile_start);
+    let column = (plane.x + depth) * 0.5 * full.x + shift.x * depth;
+    let row = (depth - plane.y) * 0.5 * full.y + shift.y * depth;
+    return vec4f(2.0 * column / size.x - depth, depth - 2.0 * row / size.y, view.near, depth);
+}
