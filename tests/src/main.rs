@@ -1,2 +1,49 @@
-//! Placeholder.
-fn main() {}
+//! The command line of the validation program.
+
+mod commands;
+
+use clap::{Parser, Subcommand};
+use std::process::ExitCode;
+
+/// Checks translucent assets against a ray-marched reference.
+#[derive(Parser)]
+#[command(name = "diaphane-validate", version, after_help = "Exit codes: 0 done, 1 a check failed, 2 bad usage or bad input.")]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Render the ray-marched single-scattering reference of a mesh
+    Reference(commands::reference::Arguments),
+    /// Print how far a picture is from a reference
+    Compare(commands::compare::Arguments),
+}
+
+fn main() -> ExitCode {
+    let arguments = match Arguments::try_parse() {
+        Ok(arguments) => arguments,
+        Err(e) if !e.use_stderr() => {
+            // Help and version were asked for.
+            let _ = e.print();
+            return ExitCode::SUCCESS;
+        }
+        Err(e) => {
+            eprintln!("{}", commands::one_line(&commands::usage_error(&e)));
+            return ExitCode::from(2);
+        }
+    };
+    let result = match arguments.command {
+        Command::Reference(a) => commands::reference::run(&a),
+        Command::Compare(a) => commands::compare::run(&a),
+    };
+    match result {
+        Ok(true) => ExitCode::SUCCESS,
+        Ok(false) => ExitCode::from(1),
+        Err(e) => {
+            eprintln!("error: {}", commands::one_line(&format!("{e:#}")));
+            ExitCode::from(2)
+        }
+    }
+}

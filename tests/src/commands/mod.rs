@@ -1,0 +1,74 @@
+//! One module for each command; each returns whether its checks passed, or the error that ends the program with 2.
+
+pub mod compare;
+pub mod progress;
+pub mod reference;
+
+use anyhow::Context;
+use diaphane_formats::{files, material, medium::Medium, mesh, mesh::Mesh, scene, scene::Scene};
+use std::path::{Path, PathBuf};
+
+/// What the reference is rendered from.
+#[derive(clap::Args)]
+pub struct Inputs {
+    /// Closed triangle mesh (OBJ)
+    #[arg(value_name = "MESH.obj")]
+    pub mesh: PathBuf,
+    /// Material file (TOML)
+    #[arg(long, value_name = "M.toml")]
+    pub material: PathBuf,
+    /// Scene file (TOML)
+    #[arg(long, value_name = "S.toml")]
+    pub scene: PathBuf,
+}
+
+/// The loaded inputs.
+pub struct Loaded {
+    /// The mesh.
+    pub mesh: Mesh,
+    /// The medium inside.
+    pub medium: Medium,
+    /// Camera and lights.
+    pub scene: Scene,
+    /// Sentences that a user should read.
+    pub warnings: Vec<String>,
+}
+
+impl Inputs {
+    /// Reads everything, cheap things first.
+    pub fn load(&self) -> anyhow::Result<Loaded> {
+        let scene = scene::load(&self.scene)?;
+        let medium = material::load(&self.material)?;
+        let (mesh, report) = mesh::load_obj(&self.mesh)?;
+        let mut warnings = report.warnings();
+        if scene.lights.is_empty() && scene.environment.is_none() {
+            warnings.push("the scene has no lights; the picture will be black".to_owned());
+        }
+        Ok(Loaded { mesh, medium, scene, warnings })
+    }
+
+    /// Fails when `output` is one of the inputs.
+    pub fn require_different(&self, output: &Path) -> anyhow::Result<()> {
+        for input in [&self.mesh, &self.material, &self.scene] {
+            files::require_different(output, input)?;
+        }
+        Ok(())
+    }
+}
+
+/// Makes a folder for output unless it exists.
+pub fn make_folder(path: &Path) -> anyhow::Result<()> {
+    std::fs::create_dir_all(path).with_context(|| format!("cannot make the folder '{}'", path.display()))
+}
+
+/// Text without line breaks.
+pub fn one_line(text: &str) -> String {
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+/// The first paragraph of clap's message and where to read more.
+pub fn usage_error(e: &clap::Error) -> String {
+    let text = e.to_string();
+    let first = text.split("\n\n").next().unwrap_or("error: wrong usage");
+    format!("{first} (see --help)")
+}

@@ -1,0 +1,64 @@
+//! Progress on standard error: a bar on a terminal, plain lines otherwise.
+
+use indicatif::{ProgressBar, ProgressStyle};
+use std::io::IsTerminal;
+use validation::reference::Progress;
+
+/// Shows how far one piece of work is.
+pub struct Display {
+    bar: Option<ProgressBar>,
+    label: String,
+    /// Last pass that was printed as a line.
+    printed: std::sync::atomic::AtomicU32,
+}
+
+impl Display {
+    /// A display that starts at nothing; `label` says what is being made.
+    pub fn new(label: &str) -> Self {
+        let bar = std::io::stderr().is_terminal().then(|| {
+            let bar = ProgressBar::new(1);
+            let style = ProgressStyle::with_template("{prefix:<28} {bar:30} {percent:>3} %  {msg}");
+            bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+            bar.set_prefix(label.to_owned());
+            bar
+        });
+        Self { bar, label: label.to_owned(), printed: std::sync::atomic::AtomicU32::new(u32::MAX) }
+    }
+
+    /// Progress of the reference.
+    pub fn reference(&self, p: Progress) {
+        use std::sync::atomic::Ordering;
+        let message = match p.pass {
+            0 => "coverage".to_owned(),
+            1 => "pass 1".to_owned(),
+            n => format!("pass {n}, noise {:.2} %", 100.0 * p.error),
+        };
+        match &self.bar {
+            Some(bar) => {
+                bar.set_length(p.total as u64);
+                bar.set_position(p.done as u64);
+                bar.set_message(message);
+            }
+            None if p.pass > 0 && self.printed.swap(p.pass, Ordering::Relaxed) != p.pass => {
+                eprintln!("{}: {message}, {} pixels", self.label, p.total);
+            }
+            None => {}
+        }
+    }
+
+    /// A share 0..1 of a named stage.
+    pub fn stage(&self, stage: &str, share: f64) {
+        if let Some(bar) = &self.bar {
+            bar.set_length(1000);
+            bar.set_position((1000.0 * share) as u64);
+            bar.set_message(stage.to_owned());
+        }
+    }
+
+    /// Takes the bar away.
+    pub fn finish(&self) {
+        if let Some(bar) = &self.bar {
+            bar.finish_and_clear();
+        }
+    }
+}
