@@ -9,6 +9,7 @@
 pub mod cpu;
 pub mod exact;
 pub mod frame;
+pub mod gpu;
 pub mod framing;
 pub mod player;
 pub mod rendered;

@@ -62,6 +62,9 @@ impl Counters {
 pub struct RayResult {
     /// Start and end of the inside pieces, mesh units along the ray; the first `count` are valid.
     pub pieces: [(f32, f32); MAX_PIECES],
+    /// Product of the Fresnel transmittances in front of each piece: where the boundary refracts, a ray through an
+    /// edge of the mesh depends on which of the two faces it is said to meet.
+    pub boundary: [f32; MAX_PIECES],
     /// Number of pieces, at most [`MAX_PIECES`].
     pub count: u32,
     /// Radiance of the samples, without surface reflection.

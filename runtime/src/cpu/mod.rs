@@ -119,6 +119,7 @@ impl CpuRenderer {
             let (radiance, _) = self.splat(frame, sources, direction, &segments);
             RayResult {
                 pieces: segments.pieces.map(|p| (p.start, p.end)),
+                boundary: segments.pieces.map(|p| p.boundary),
                 count: segments.count as u32,
                 radiance: radiance.to_array(),
             }

@@ -55,8 +55,14 @@ impl ViewUniform {
             offset,
             near: NEAR * diagonal,
             least_distance: frame.least_distance,
-            specular: if surface.reflection { surface.specular as f32 } else { 0.0 },
-            alpha: (surface.roughness as f32).max(crate::cpu::surface::LEAST_ROUGHNESS).powi(2),
+            specular: if surface.reflection {
+                surface.specular as f32
+            } else {
+                0.0
+            },
+            alpha: (surface.roughness as f32)
+                .max(crate::cpu::surface::LEAST_ROUGHNESS)
+                .powi(2),
             unused: [0; 2],
         }
     }
@@ -87,7 +93,11 @@ impl MediumUniform {
     pub fn new(asset: &Asset) -> Self {
         let info = &asset.info;
         let extinction = DVec3::from(info.extinction);
-        let along = if asset.density.is_some() { extinction } else { extinction * info.uniform_density };
+        let along = if asset.density.is_some() {
+            extinction
+        } else {
+            extinction * info.uniform_density
+        };
         let reference = info.reference_extinction;
         let (encoding, epsilon) = match info.encoding {
             Encoding::Transmittance => (0, 0.0),
@@ -99,7 +109,11 @@ impl MediumUniform {
             order: info.order,
             extinction: extinction.as_vec3(),
             samples: asset.samples.len() as u32,
-            ratio: if reference > 0.0 { (extinction / reference).as_vec3() } else { Vec3::ZERO },
+            ratio: if reference > 0.0 {
+                (extinction / reference).as_vec3()
+            } else {
+                Vec3::ZERO
+            },
             encoding,
             albedo: DVec3::from(info.albedo).as_vec3(),
             epsilon,
@@ -155,11 +169,19 @@ mod tests {
 
     /// Fields of a WGSL struct with WGSL's offsets, and its size.
     fn wgsl(source: &str, name: &str) -> (Vec<(String, usize)>, usize) {
-        let body = source.split(&format!("struct {name} {{")).nth(1).unwrap().split('}').next().unwrap();
+        let body = source
+            .split(&format!("struct {name} {{"))
+            .nth(1)
+            .unwrap()
+            .split('}')
+            .next()
+            .unwrap();
         let (mut at, mut align_all, mut fields) = (0usize, 4, Vec::new());
         for line in body.lines() {
             let line = line.split("//").next().unwrap().trim().trim_end_matches(',');
-            let Some((field, kind)) = line.split_once(':') else { continue };
+            let Some((field, kind)) = line.split_once(':') else {
+                continue;
+            };
             let (align, size) = match kind.trim() {
                 "vec3f" | "vec3u" => (16, 12),
                 "vec2f" | "vec2u" => (8, 8),
@@ -186,15 +208,55 @@ mod tests {
     #[test]
     fn structs_lie_as_the_shaders_read_them() {
         mirrors!(
-            ViewUniform, "view.wgsl", "View", origin, width, forward, height, right, light_count, up, scene_lights,
-            tile_start, tile_size, offset, near, least_distance, specular, alpha
+            ViewUniform,
+            "view.wgsl",
+            "View",
+            origin,
+            width,
+            forward,
+            height,
+            right,
+            light_count,
+            up,
+            scene_lights,
+            tile_start,
+            tile_size,
+            offset,
+            near,
+            least_distance,
+            specular,
+            alpha
         );
         mirrors!(
-            MediumUniform, "medium.wgsl", "Medium", kappa, order, extinction, samples, ratio, encoding, albedo,
-            epsilon, grid_min, mean_cosine, grid_max, ior, grid_size, triangles
+            MediumUniform,
+            "medium.wgsl",
+            "Medium",
+            kappa,
+            order,
+            extinction,
+            samples,
+            ratio,
+            encoding,
+            albedo,
+            epsilon,
+            grid_min,
+            mean_cosine,
+            grid_max,
+            ior,
+            grid_size,
+            triangles
         );
         mirrors!(
-            LightRecord, "light.wgsl", "Light", position, kind, direction, cos_inner, colour, cos_outer, table
+            LightRecord,
+            "light.wgsl",
+            "Light",
+            position,
+            kind,
+            direction,
+            cos_inner,
+            colour,
+            cos_outer,
+            table
         );
     }
 }

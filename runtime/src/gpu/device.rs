@@ -1,0 +1,151 @@
+//! Finding an adapter that can draw measured pictures, and catching what the driver complains about.
+
+use crate::{Error, Result};
+use std::sync::{Arc, Mutex, PoisonError};
+use wgpu::{
+    Adapter, Backends, Device, DeviceDescriptor, DeviceType, DownlevelFlags, Features, Instance,
+    InstanceDescriptor, Queue, Surface,
+};
+
+/// A device with its queue, and the complaints that reached nobody else.
+pub(super) struct OwnedDevice {
+    pub device: Device,
+    pub queue: Queue,
+    pub adapter: Adapter,
+    faults: Faults,
+}
+
+/// The first complaint of a device since it was last asked.
+#[derive(Clone, Default)]
+struct Faults(Arc<Mutex<Option<String>>>);
+
+impl Faults {
+    fn report(&self, message: String) {
+        log::error!("{message}");
+        self.0
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .get_or_insert(message);
+    }
+
+    fn take(&self) -> Option<String> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).take()
+    }
+}
+
+/// What every pass needs of an adapter.
+const NEEDED: Features = Features::FLOAT32_BLENDABLE;
+
+/// What a full adapter has and the simplest do not.
+const NEEDED_FLAGS: DownlevelFlags = DownlevelFlags::COMPUTE_SHADERS
+    .union(DownlevelFlags::FRAGMENT_WRITABLE_STORAGE)
+    .union(DownlevelFlags::VERTEX_STORAGE)
+    .union(DownlevelFlags::INDIRECT_EXECUTION);
+
+/// An instance with all backends of this platform; the environment variables that wgpu knows apply.
+pub(super) fn instance() -> Instance {
+    Instance::new(InstanceDescriptor::new_without_display_handle().with_env())
+}
+
+impl OwnedDevice {
+    /// The best adapter that can draw, hardware before software, and able to show on `surface` if one is given.
+    ///
+    /// # Errors
+    /// [`Error::NoAdapter`] that says what was found and what it lacks.
+    pub fn open(instance: &Instance, surface: Option<&Surface<'_>>) -> Result<Self> {
+        let mut adapters = pollster::block_on(instance.enumerate_adapters(Backends::all()));
+        if adapters.is_empty() {
+            return Err(Error::NoAdapter(
+                "no Vulkan, Metal or DirectX 12 driver was found".to_owned(),
+            ));
+        }
+        adapters.sort_by_key(|a| rank(a.get_info().device_type));
+        let mut refused = Vec::new();
+        for adapter in adapters {
+            match lacking(&adapter, surface) {
+                None => return Self::request(adapter),
+                Some(reason) => refused.push(format!("{} {reason}", adapter.get_info().name)),
+            }
+        }
+        Err(Error::NoAdapter(refused.join(", ")))
+    }
+
+    fn request(adapter: Adapter) -> Result<Self> {
+        let required_features = NEEDED | (adapter.features() & Features::TIMESTAMP_QUERY);
+        let name = adapter.get_info().name;
+        let (device, queue) = pollster::block_on(adapter.request_device(&DeviceDescriptor {
+            label: Some("diaphane"),
+            required_features,
+            required_limits: adapter.limits(),
+            ..Default::default()
+        }))
+        .map_err(|e| Error::NoAdapter(format!("{name} gives no device ({e})")))?;
+        let faults = Faults::default();
+        let report = faults.clone();
+        device.on_uncaptured_error(Arc::new(move |e| report.report(first_line(&e.to_string()))));
+        let report = faults.clone();
+        device.set_device_lost_callback(move |reason, message| {
+            if reason != wgpu::DeviceLostReason::Destroyed {
+                report.report(format!("the device was lost: {}", first_line(&message)));
+            }
+        });
+        Ok(Self {
+            device,
+            queue,
+            adapter,
+            faults,
+        })
+    }
+
+    /// The adapter's name, and its driver where it says.
+    pub fn describe(&self) -> String {
+        let info = self.adapter.get_info();
+        let software = if info.device_type == DeviceType::Cpu {
+            ", software"
+        } else {
+            ""
+        };
+        format!("{} ({}{software})", info.name, info.backend)
+    }
+
+    /// The first complaint since the last call, as an error.
+    pub fn check(&self) -> Result<()> {
+        self.faults
+            .take()
+            .map_or(Ok(()), |message| Err(Error::Gpu(message)))
+    }
+}
+
+/// Errors of wgpu explain themselves over many lines; one is enough for a user, the log has the rest.
+fn first_line(message: &str) -> String {
+    message
+        .lines()
+        .map(str::trim)
+        .filter(|l| !l.is_empty())
+        .collect::<Vec<_>>()
+        .join("; ")
+}
+
+fn rank(kind: DeviceType) -> u32 {
+    match kind {
+        DeviceType::DiscreteGpu => 0,
+        DeviceType::IntegratedGpu => 1,
+        DeviceType::VirtualGpu => 2,
+        DeviceType::Other => 3,
+        DeviceType::Cpu => 4,
+    }
+}
+
+/// Why an adapter cannot be used.
+fn lacking(adapter: &Adapter, surface: Option<&Surface<'_>>) -> Option<&'static str> {
+    if !adapter.features().contains(NEEDED) {
+        return Some("cannot blend 32-bit floats");
+    }
+    if !adapter.get_downlevel_capabilities().flags.contains(NEEDED_FLAGS) {
+        return Some("cannot write storage buffers from all shaders");
+    }
+    if surface.is_some_and(|s| !adapter.is_surface_supported(s)) {
+        return Some("cannot show pictures in this window");
+    }
+    None
+}

@@ -1,0 +1,272 @@
+//! A renderer that owns its device and reads its pictures back.
+
+use super::bindings::empty_buffer;
+use super::device::{OwnedDevice, instance};
+use super::renderer::Renderer;
+use super::targets::Targets;
+use super::tiles::Tile;
+use super::timers::{Pass, Timers};
+use crate::exact::ExactDepths;
+use crate::frame::Frame;
+use crate::rendered::{Counters, MAX_PIECES, RayResult, Rendered};
+use crate::{Error, Result};
+use diaphane_formats::asset::Asset;
+use diaphane_formats::directions::subpixel_offsets;
+use diaphane_formats::picture::Picture;
+use std::sync::mpsc;
+use std::time::Instant;
+use wgpu::{Buffer, BufferUsages, CommandEncoder, MapMode, PollType};
+
+/// Draws frames of one asset on the GPU, or on a software adapter where that is all there is.
+pub struct GpuRenderer {
+    owned: OwnedDevice,
+    renderer: Renderer,
+    timers: Timers,
+    name: String,
+    tiles: usize,
+}
+
+impl GpuRenderer {
+    /// Finds an adapter and uploads an asset.
+    ///
+    /// # Errors
+    /// [`Error::NoAdapter`] without a usable adapter; an asset that makes no sense or does not fit.
+    pub fn new(asset: &Asset) -> Result<Self> {
+        let owned = OwnedDevice::open(&instance(), None)?;
+        let renderer = Renderer::new(&owned.device, asset)?;
+        owned.check()?;
+        let timers = Timers::new(&owned.device, &owned.queue, 1);
+        let name = owned.describe();
+        Ok(Self {
+            owned,
+            renderer,
+            timers,
+            name,
+            tiles: 0,
+        })
+    }
+
+    /// The adapter's name, backend, and whether it is software.
+    pub fn adapter(&self) -> &str {
+        &self.name
+    }
+
+    /// Tiles that the last picture was drawn in; more than one where it was too large for the adapter's buffers.
+    pub fn tiles(&self) -> usize {
+        self.tiles
+    }
+
+    /// Draws a frame. Times of passes come from the adapter's clock; one that has none gives the single entry
+    /// "frame", measured outside.
+    ///
+    /// # Errors
+    /// The GPU failed, or something is too large for it.
+    pub fn render(&mut self, frame: &Frame, exact: Option<&ExactDepths>) -> Result<Rendered> {
+        let started = Instant::now();
+        let offsets = subpixel_offsets(frame.samples_per_pixel as usize);
+        let mut picture = Picture::new(frame.width as usize, frame.height as usize);
+        let mut coverage = vec![0.0; picture.pixels.len()];
+        let mut counters = Counters {
+            rays: u64::from(frame.width) * u64::from(frame.height) * offsets.len() as u64,
+            samples_drawn: self.renderer.asset.samples_drawn,
+            ..Counters::default()
+        };
+        let per_ray = 1.0 / offsets.len() as f32;
+        let milliseconds = self.draw(frame, exact, &offsets, |tile, data| {
+            for (i, (sum, counts)) in data.radiance.iter().zip(data.counters).enumerate() {
+                let at = data.place(tile, i, frame.width);
+                picture.pixels[at] = [sum[0] * per_ray, sum[1] * per_ray, sum[2] * per_ray];
+                coverage[at] = counts[0] as f32 * per_ray;
+                counters.rays_hit += u64::from(counts[0]);
+                counters.pieces_dropped += u64::from(counts[1]);
+                counters.splats += u64::from(counts[2]);
+                counters.uncovered += u64::from(counts[3]);
+            }
+        })?;
+        picture.coverage = Some(coverage);
+        let mut passes: Vec<(&'static str, f64)> = Pass::ALL
+            .into_iter()
+            .filter(|p| milliseconds[*p as usize] > 0.0)
+            .map(|p| (p.name(), milliseconds[p as usize]))
+            .collect();
+        if passes.is_empty() {
+            passes.push(("frame", started.elapsed().as_secs_f64() * 1e3));
+        }
+        Ok(Rendered {
+            picture,
+            counters,
+            passes,
+        })
+    }
+
+    /// What one ray of every pixel sees, at `offset` inside the pixel (0..1), without highlights: rows one after the
+    /// other. For comparing backends.
+    ///
+    /// # Errors
+    /// As [`Self::render`].
+    pub fn trace_rays(
+        &mut self,
+        frame: &Frame,
+        exact: Option<&ExactDepths>,
+        offset: [f32; 2],
+    ) -> Result<Vec<RayResult>> {
+        let mut plain = frame.clone();
+        plain.surface.reflection = false;
+        let mut rays = vec![RayResult::default(); frame.width as usize * frame.height as usize];
+        self.draw(&plain, exact, &[offset], |tile, data| {
+            for (i, sum) in data.radiance.iter().enumerate() {
+                let ray = &mut rays[data.place(tile, i, frame.width)];
+                ray.radiance = [sum[0], sum[1], sum[2]];
+                let mut passed = 1.0;
+                for k in 0..MAX_PIECES {
+                    let [start, end, entry, exit] = data.pieces[k * data.stride + i];
+                    if end > start {
+                        ray.pieces[k] = (start, end);
+                        ray.boundary[k] = passed * entry;
+                        passed *= entry * exit;
+                        ray.count += 1;
+                    }
+                }
+            }
+        })?;
+        Ok(rays)
+    }
+
+    /// Draws all tiles and hands each to `take`. Returns milliseconds by pass.
+    fn draw(
+        &mut self,
+        frame: &Frame,
+        exact: Option<&ExactDepths>,
+        offsets: &[[f32; 2]],
+        mut take: impl FnMut(Tile, TileData),
+    ) -> Result<[f64; 7]> {
+        let OwnedDevice { device, queue, .. } = &self.owned;
+        let tiles = self.renderer.begin(device, queue, frame, exact)?;
+        self.tiles = tiles.len();
+        let submissions = offsets.len() as u64 + 1;
+        if self.timers.capacity() < submissions {
+            self.timers = Timers::new(device, queue, submissions);
+        }
+        let mut milliseconds = [0.0; 7];
+        for (t, &tile) in tiles.iter().enumerate() {
+            self.renderer.write_views(device, queue, frame, &[tile], offsets);
+            self.timers.restart();
+            // One submission for each ray keeps every one short, whatever the adapter's patience.
+            let submit = |timers: &mut Timers, record: &dyn Fn(&mut CommandEncoder, &mut Timers)| {
+                let mut encoder = device.create_command_encoder(&Default::default());
+                record(&mut encoder, timers);
+                timers.close(&mut encoder);
+                queue.submit([encoder.finish()]);
+            };
+            submit(&mut self.timers, &|encoder, timers| {
+                self.renderer.record_start(encoder);
+                if t == 0 {
+                    self.renderer.record_lighting(encoder, timers);
+                }
+            });
+            for view in 0..offsets.len() {
+                submit(&mut self.timers, &|e, timers| {
+                    self.renderer.record_ray(e, timers, view, tile)
+                });
+            }
+            self.read(tile, &mut milliseconds, &mut take)?;
+        }
+        self.owned.check()?;
+        Ok(milliseconds)
+    }
+
+    /// Waits for a tile and reads it back.
+    fn read(
+        &self,
+        tile: Tile,
+        milliseconds: &mut [f64; 7],
+        take: &mut impl FnMut(Tile, TileData),
+    ) -> Result<()> {
+        let targets = self
+            .renderer
+            .targets()
+            .ok_or_else(|| Error::Gpu("nothing was drawn".to_owned()))?;
+        let size = 16 * tile.pixels();
+        let mut sources: Vec<(&Buffer, u64)> = vec![
+            (&targets.radiance, size),
+            (&targets.counters, size),
+            (&targets.pieces, targets.pieces.size()),
+        ];
+        sources.extend(self.timers.buffer());
+        let copies = self.copy_back(&sources)?;
+        let view = |i: usize| {
+            copies[i]
+                .get_mapped_range(..)
+                .map_err(|e| Error::Gpu(format!("cannot read the picture back: {e}")))
+        };
+        let (radiance, counters, pieces) = (view(0)?, view(1)?, view(2)?);
+        if copies.len() > 3 {
+            self.timers.sum(&view(3)?, milliseconds);
+        }
+        take(
+            tile,
+            TileData {
+                radiance: bytemuck::cast_slice(&radiance),
+                counters: bytemuck::cast_slice(&counters),
+                pieces: bytemuck::cast_slice(&pieces),
+                stride: Targets::stride(targets),
+            },
+        );
+        Ok(())
+    }
+
+    /// Copies of buffers that the program can read, once everything submitted is done.
+    fn copy_back(&self, sources: &[(&Buffer, u64)]) -> Result<Vec<Buffer>> {
+        let OwnedDevice { device, queue, .. } = &self.owned;
+        let mut encoder = device.create_command_encoder(&Default::default());
+        let copies: Vec<Buffer> = sources
+            .iter()
+            .map(|(source, size)| {
+                let copy = empty_buffer(
+                    device,
+                    "copy",
+                    *size,
+                    BufferUsages::MAP_READ | BufferUsages::COPY_DST,
+                );
+                encoder.copy_buffer_to_buffer(source, 0, &copy, 0, *size);
+                copy
+            })
+            .collect();
+        queue.submit([encoder.finish()]);
+        let (done, results) = mpsc::channel();
+        for copy in &copies {
+            let done = done.clone();
+            // Nobody listens any more only when an earlier copy failed already.
+            copy.map_async(MapMode::Read, .., move |result| drop(done.send(result)));
+        }
+        device
+            .poll(PollType::wait_indefinitely())
+            .map_err(|e| Error::Gpu(e.to_string()))?;
+        self.owned.check()?;
+        for _ in &copies {
+            let failed = || Error::Gpu("the picture could not be read back".to_owned());
+            results.try_recv().map_err(|_| failed())?.map_err(|_| failed())?;
+        }
+        Ok(copies)
+    }
+}
+
+/// What was read back of a tile: an entry for each pixel, rows one after the other.
+struct TileData<'a> {
+    /// Sum of radiance over the rays.
+    radiance: &'a [[f32; 4]],
+    /// Rays that hit, pieces dropped, kernels, rays without a kernel.
+    counters: &'a [[u32; 4]],
+    /// Of the last ray: piece k of pixel i at `k * stride + i`: start, end, transmittances.
+    pieces: &'a [[f32; 4]],
+    stride: usize,
+}
+
+impl TileData<'_> {
+    /// Place of a tile's pixel in a picture of `width` columns.
+    fn place(&self, tile: Tile, pixel: usize, width: u32) -> usize {
+        let columns = tile.size[0] as usize;
+        let (row, column) = (pixel / columns, pixel % columns);
+        (tile.start[1] as usize + row) * width as usize + tile.start[0] as usize + column
+    }
+}

@@ -1,0 +1,27 @@
+//! The wgpu renderer: one module in `passes` and one shader for each pass, in this order:
+//!
+//! ```text
+//! lighting                     once a frame: samples × lights -> source of every sample
+//! surface [boundary] segments  each sub-pixel ray: mesh -> sorted crossings -> up to four inside pieces
+//! [profile] splat resolve      each piece: kernels along it, summed and normalised -> picture
+//! ```
+//!
+//! [`GpuRenderer`] owns its device and reads pictures back; [`Renderer`] records the same passes into a host's command
+//! buffer. Boundary runs where `ior` is not 1, profile where the medium has a density grid. Later pieces of rays are
+//! drawn indirectly and cost next to nothing where no ray has them. Sums are kept in 32-bit floats and blended in the
+//! order of the samples: the same adapter draws the same bits every time.
+
+mod bindings;
+mod device;
+mod headless;
+mod passes;
+mod renderer;
+mod scene;
+mod shaders;
+mod targets;
+mod tiles;
+mod timers;
+mod uniforms;
+
+pub use headless::GpuRenderer;
+pub use renderer::Renderer;

@@ -1,0 +1,54 @@
+//! The passes: pipelines, and the commands of each.
+
+pub(super) mod boundary;
+pub(super) mod lighting;
+pub(super) mod profile;
+pub(super) mod resolve;
+pub(super) mod segments;
+pub(super) mod splat;
+pub(super) mod surface;
+
+use wgpu::{BindGroup, CommandEncoder, ComputePassDescriptor, ComputePipeline};
+
+use super::timers::{Pass, Timers};
+
+/// What a pass is recorded with: the command buffer, the shared group and the ray's place in it.
+pub(super) struct Recorder<'a> {
+    pub encoder: &'a mut CommandEncoder,
+    pub timers: &'a mut Timers,
+    pub common: &'a BindGroup,
+    pub view_offset: u32,
+    /// Columns and rows of the tile; the targets may be larger.
+    pub tile: [u32; 2],
+}
+
+impl Recorder<'_> {
+    /// Workgroups of 8 × 8 that cover the tile.
+    fn pixel_groups(&self) -> [u32; 2] {
+        self.tile.map(|n| n.div_ceil(8))
+    }
+
+    /// Points a render pass at the tile and the shared group.
+    fn aim(common: &BindGroup, view_offset: u32, tile: [u32; 2], render: &mut wgpu::RenderPass<'_>) {
+        render.set_viewport(0.0, 0.0, tile[0] as f32, tile[1] as f32, 0.0, 1.0);
+        render.set_bind_group(0, common, &[view_offset]);
+    }
+
+    /// Runs a compute pass; `dispatch` starts its workgroups.
+    fn compute(
+        &mut self,
+        pass: Pass,
+        pipeline: &ComputePipeline,
+        group: &BindGroup,
+        dispatch: impl FnOnce(&mut wgpu::ComputePass<'_>),
+    ) {
+        let mut compute = self.encoder.begin_compute_pass(&ComputePassDescriptor {
+            label: Some(pass.name()),
+            timestamp_writes: self.timers.compute(pass),
+        });
+        compute.set_pipeline(pipeline);
+        compute.set_bind_group(0, self.common, &[self.view_offset]);
+        compute.set_bind_group(1, group, &[]);
+        dispatch(&mut compute);
+    }
+}

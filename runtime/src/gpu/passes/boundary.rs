@@ -1,0 +1,56 @@
+//! The boundary pass: Fresnel reflectance of every crossing and the highlight of the first entry.
+
+use super::super::bindings::{Slot, group, layout, pipeline_layout};
+use super::super::scene::{AssetBuffers, FrameBuffers};
+use super::super::shaders;
+use super::super::targets::Targets;
+use super::super::timers::Pass;
+use super::Recorder;
+use super::surface::{draw_mesh, mesh_pipeline};
+use wgpu::{BindGroup, BindGroupLayout, Device, RenderPipeline, ShaderStages};
+
+/// See boundary.wgsl.
+pub(crate) struct Boundary {
+    layout: BindGroupLayout,
+    pipeline: RenderPipeline,
+}
+
+impl Boundary {
+    pub fn new(device: &Device, common: &BindGroupLayout) -> Self {
+        use Slot::{Read, Write};
+        let slots = [Read, Read, Write, Read, Read, Write];
+        let layout = layout(device, "boundary", ShaderStages::VERTEX_FRAGMENT, &slots);
+        let pipeline_layout = pipeline_layout(device, "boundary", common, &layout);
+        let module = shaders::module(device, "boundary", shaders::BOUNDARY);
+        let pipeline = mesh_pipeline(device, "boundary", &pipeline_layout, &module, "reflect_at");
+        Self { layout, pipeline }
+    }
+
+    pub fn bind(
+        &self,
+        device: &Device,
+        asset: &AssetBuffers,
+        frame: &FrameBuffers,
+        targets: &Targets,
+    ) -> BindGroup {
+        let resources = [
+            &asset.positions,
+            &asset.triangles,
+            &targets.crossings,
+            &asset.normals,
+            &frame.lights,
+            &targets.boundary,
+        ];
+        group(
+            device,
+            "boundary",
+            &self.layout,
+            resources.map(|b| b.as_entire_binding()).into(),
+        )
+    }
+
+    pub fn record(&self, r: &mut Recorder, group: &BindGroup, asset: &AssetBuffers, targets: &Targets) {
+        r.encoder.clear_buffer(&targets.boundary, 0, None);
+        draw_mesh(r, Pass::Boundary, &self.pipeline, group, asset, targets);
+    }
+}

@@ -1,0 +1,47 @@
+//! The profile pass: density along one inside piece of every pixel.
+
+use super::super::bindings::{Slot, compute, group, layout, pipeline_layout};
+use super::super::scene::AssetBuffers;
+use super::super::shaders;
+use super::super::targets::{ARGUMENTS, Targets};
+use super::super::timers::Pass;
+use super::Recorder;
+use wgpu::{BindGroup, BindGroupLayout, ComputePipeline, Device, ShaderStages};
+
+/// See profile.wgsl.
+pub(crate) struct Profile {
+    layout: BindGroupLayout,
+    pipeline: ComputePipeline,
+}
+
+impl Profile {
+    pub fn new(device: &Device, common: &BindGroupLayout) -> Self {
+        let layout = layout(
+            device,
+            "profile",
+            ShaderStages::COMPUTE,
+            &[Slot::Read, Slot::Write, Slot::Read],
+        );
+        let pipeline_layout = pipeline_layout(device, "profile", common, &layout);
+        let module = shaders::module(device, "profile", shaders::PROFILE);
+        let pipeline = compute(device, "profile", &pipeline_layout, &module, &[]);
+        Self { layout, pipeline }
+    }
+
+    pub fn bind(&self, device: &Device, asset: &AssetBuffers, targets: &Targets, piece: usize) -> BindGroup {
+        let resources = vec![
+            targets.piece(piece),
+            targets.profile.as_entire_binding(),
+            asset.grid.as_entire_binding(),
+        ];
+        group(device, "profile", &self.layout, resources)
+    }
+
+    /// Does nothing where no pixel has this piece.
+    pub fn record(&self, r: &mut Recorder, group: &BindGroup, targets: &Targets, piece: usize) {
+        let at = ARGUMENTS * piece as u64 + 16;
+        r.compute(Pass::Profile, &self.pipeline, group, |pass| {
+            pass.dispatch_workgroups_indirect(&targets.arguments, at);
+        });
+    }
+}

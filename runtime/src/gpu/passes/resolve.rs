@@ -1,0 +1,44 @@
+//! The resolve pass: one inside piece of every pixel joins the picture.
+
+use super::super::bindings::{Slot, compute, group, layout, pipeline_layout};
+use super::super::scene::AssetBuffers;
+use super::super::shaders;
+use super::super::targets::{ARGUMENTS, Targets};
+use super::super::timers::Pass;
+use super::Recorder;
+use wgpu::{BindGroup, BindGroupLayout, BindingResource, ComputePipeline, Device, ShaderStages};
+
+/// See resolve.wgsl.
+pub(crate) struct Resolve {
+    layout: BindGroupLayout,
+    pipeline: ComputePipeline,
+}
+
+impl Resolve {
+    pub fn new(device: &Device, common: &BindGroupLayout, asset: &AssetBuffers) -> Self {
+        use Slot::{Read, Texture, Write};
+        let slots = [Read, Read, Write, Write, Write, Texture, Texture];
+        let layout = layout(device, "resolve", ShaderStages::COMPUTE, &slots);
+        let pipeline_layout = pipeline_layout(device, "resolve", common, &layout);
+        let module = shaders::module(device, "resolve", shaders::RESOLVE);
+        let constants = [("HETEROGENEOUS", f64::from(u8::from(asset.heterogeneous)))];
+        let pipeline = compute(device, "resolve", &pipeline_layout, &module, &constants);
+        Self { layout, pipeline }
+    }
+
+    pub fn bind(&self, device: &Device, targets: &Targets, piece: usize) -> BindGroup {
+        let t = targets;
+        let mut resources = vec![t.piece(piece)];
+        resources.extend([&t.profile, &t.front, &t.radiance, &t.counters].map(|b| b.as_entire_binding()));
+        resources.extend([&t.numerator, &t.denominator].map(BindingResource::TextureView));
+        group(device, "resolve", &self.layout, resources)
+    }
+
+    /// Does nothing where no pixel has this piece.
+    pub fn record(&self, r: &mut Recorder, group: &BindGroup, targets: &Targets, piece: usize) {
+        let at = ARGUMENTS * piece as u64 + 16;
+        r.compute(Pass::Resolve, &self.pipeline, group, |pass| {
+            pass.dispatch_workgroups_indirect(&targets.arguments, at);
+        });
+    }
+}

@@ -1,0 +1,109 @@
+//! The splat pass: every sample's kernel along one inside piece of every pixel.
+
+use super::super::bindings::{Slot, group, layout, options, pipeline_layout};
+use super::super::scene::AssetBuffers;
+use super::super::shaders;
+use super::super::targets::{ARGUMENTS, SUM_FORMAT, Targets};
+use super::super::timers::Pass;
+use super::Recorder;
+use wgpu::{
+    BindGroup, BindGroupLayout, BlendComponent, BlendFactor, BlendOperation, BlendState, Color,
+    ColorTargetState, ColorWrites, Device, FragmentState, LoadOp, Operations, PrimitiveState,
+    PrimitiveTopology, RenderPassColorAttachment, RenderPassDescriptor, RenderPipeline,
+    RenderPipelineDescriptor, ShaderStages, StoreOp, TextureView, VertexState,
+};
+
+const ADD: BlendComponent = BlendComponent {
+    src_factor: BlendFactor::One,
+    dst_factor: BlendFactor::One,
+    operation: BlendOperation::Add,
+};
+
+/// See splat.wgsl.
+pub(crate) struct Splat {
+    layout: BindGroupLayout,
+    pipeline: RenderPipeline,
+}
+
+impl Splat {
+    pub fn new(device: &Device, common: &BindGroupLayout, asset: &AssetBuffers) -> Self {
+        let layout = layout(device, "splat", ShaderStages::VERTEX_FRAGMENT, &[Slot::Read; 4]);
+        let pipeline_layout = pipeline_layout(device, "splat", common, &layout);
+        let module = shaders::module(device, "splat", shaders::SPLAT);
+        let constants = [
+            ("GREY", f64::from(u8::from(asset.grey))),
+            ("HETEROGENEOUS", f64::from(u8::from(asset.heterogeneous))),
+        ];
+        let target = Some(ColorTargetState {
+            format: SUM_FORMAT,
+            blend: Some(BlendState {
+                color: ADD,
+                alpha: ADD,
+            }),
+            write_mask: ColorWrites::ALL,
+        });
+        let pipeline = device.create_render_pipeline(&RenderPipelineDescriptor {
+            label: Some("splat"),
+            layout: Some(&pipeline_layout),
+            vertex: VertexState {
+                module: &module,
+                entry_point: Some("quad"),
+                compilation_options: options(&constants),
+                buffers: &[],
+            },
+            primitive: PrimitiveState {
+                topology: PrimitiveTopology::TriangleStrip,
+                ..Default::default()
+            },
+            depth_stencil: None,
+            multisample: Default::default(),
+            fragment: Some(FragmentState {
+                module: &module,
+                entry_point: Some("add"),
+                compilation_options: options(&constants),
+                targets: &[target.clone(), target],
+            }),
+            multiview_mask: None,
+            cache: None,
+        });
+        Self { layout, pipeline }
+    }
+
+    pub fn bind(&self, device: &Device, asset: &AssetBuffers, targets: &Targets, piece: usize) -> BindGroup {
+        let resources = vec![
+            asset.samples.as_entire_binding(),
+            asset.sources.as_entire_binding(),
+            targets.piece(piece),
+            targets.profile.as_entire_binding(),
+        ];
+        group(device, "splat", &self.layout, resources)
+    }
+
+    /// Only clears where no pixel has this piece.
+    pub fn record(&self, r: &mut Recorder, group: &BindGroup, targets: &Targets, piece: usize) {
+        let mut render = r.encoder.begin_render_pass(&RenderPassDescriptor {
+            label: Some("splat"),
+            color_attachments: &[cleared(&targets.numerator), cleared(&targets.denominator)],
+            depth_stencil_attachment: None,
+            timestamp_writes: r.timers.render(Pass::Splat),
+            occlusion_query_set: None,
+            multiview_mask: None,
+        });
+        render.set_pipeline(&self.pipeline);
+        Recorder::aim(r.common, r.view_offset, r.tile, &mut render);
+        render.set_bind_group(1, group, &[]);
+        render.draw_indirect(&targets.arguments, ARGUMENTS * piece as u64);
+    }
+}
+
+fn cleared(view: &TextureView) -> Option<RenderPassColorAttachment<'_>> {
+    Some(RenderPassColorAttachment {
+        view,
+        depth_slice: None,
+        resolve_target: None,
+        ops: Operations {
+            load: LoadOp::Clear(Color::TRANSPARENT),
+            store: StoreOp::Store,
+        },
+    })
+}

@@ -1,0 +1,122 @@
+//! The surface pass: crossings of all rays with the mesh.
+
+use super::super::bindings::{Slot, group, layout, options, pipeline_layout};
+use super::super::scene::AssetBuffers;
+use super::super::shaders;
+use super::super::targets::{MARKER_FORMAT, Targets};
+use super::super::timers::Pass;
+use super::Recorder;
+use wgpu::{
+    BindGroup, BindGroupLayout, Color, ColorTargetState, ColorWrites, Device, FragmentState, FrontFace,
+    LoadOp, Operations, PipelineLayout, PrimitiveState, PrimitiveTopology, RenderPassColorAttachment,
+    RenderPassDescriptor, RenderPipeline, RenderPipelineDescriptor, ShaderModule, ShaderStages, StoreOp,
+    VertexState,
+};
+
+/// See surface.wgsl.
+pub(crate) struct Surface {
+    layout: BindGroupLayout,
+    pipeline: RenderPipeline,
+}
+
+impl Surface {
+    pub fn new(device: &Device, common: &BindGroupLayout) -> Self {
+        let layout = layout(
+            device,
+            "surface",
+            ShaderStages::VERTEX_FRAGMENT,
+            &[Slot::Read, Slot::Read, Slot::Write],
+        );
+        let pipeline_layout = pipeline_layout(device, "surface", common, &layout);
+        let module = shaders::module(device, "surface", shaders::SURFACE);
+        let pipeline = mesh_pipeline(device, "surface", &pipeline_layout, &module, "insert");
+        Self { layout, pipeline }
+    }
+
+    pub fn bind(&self, device: &Device, asset: &AssetBuffers, targets: &Targets) -> BindGroup {
+        let resources = [&asset.positions, &asset.triangles, &targets.crossings];
+        group(
+            device,
+            "surface",
+            &self.layout,
+            resources.map(|b| b.as_entire_binding()).into(),
+        )
+    }
+
+    pub fn record(&self, r: &mut Recorder, group: &BindGroup, asset: &AssetBuffers, targets: &Targets) {
+        r.encoder.clear_buffer(&targets.crossings, 0, None);
+        draw_mesh(r, Pass::Surface, &self.pipeline, group, asset, targets);
+    }
+}
+
+/// A pipeline that draws every triangle from both sides and writes no attachment. The pass needs one none the less,
+/// because its size is the tile's.
+pub(super) fn mesh_pipeline(
+    device: &Device,
+    label: &str,
+    layout: &PipelineLayout,
+    module: &ShaderModule,
+    fragment: &str,
+) -> RenderPipeline {
+    device.create_render_pipeline(&RenderPipelineDescriptor {
+        label: Some(label),
+        layout: Some(layout),
+        vertex: VertexState {
+            module,
+            entry_point: Some("corner"),
+            compilation_options: options(&[]),
+            buffers: &[],
+        },
+        primitive: PrimitiveState {
+            topology: PrimitiveTopology::TriangleList,
+            front_face: FrontFace::Ccw,
+            cull_mode: None,
+            ..Default::default()
+        },
+        depth_stencil: None,
+        multisample: Default::default(),
+        fragment: Some(FragmentState {
+            module,
+            entry_point: Some(fragment),
+            compilation_options: options(&[]),
+            targets: &[Some(ColorTargetState {
+                format: MARKER_FORMAT,
+                blend: None,
+                write_mask: ColorWrites::empty(),
+            })],
+        }),
+        multiview_mask: None,
+        cache: None,
+    })
+}
+
+/// Draws the whole mesh.
+pub(super) fn draw_mesh(
+    r: &mut Recorder,
+    pass: Pass,
+    pipeline: &RenderPipeline,
+    group: &BindGroup,
+    asset: &AssetBuffers,
+    targets: &Targets,
+) {
+    let mut render = r.encoder.begin_render_pass(&RenderPassDescriptor {
+        label: Some(pass.name()),
+        color_attachments: &[Some(RenderPassColorAttachment {
+            view: &targets.marker,
+            depth_slice: None,
+            resolve_target: None,
+            ops: Operations {
+                load: LoadOp::Clear(Color::TRANSPARENT),
+                store: StoreOp::Discard,
+            },
+        })],
+        depth_stencil_attachment: None,
+        timestamp_writes: r.timers.render(pass),
+        occlusion_query_set: None,
+        multiview_mask: None,
+    });
+    render.set_pipeline(pipeline);
+    Recorder::aim(r.common, r.view_offset, r.tile, &mut render);
+    render.set_bind_group(1, group, &[]);
+    render.draw(0..3 * asset.triangle_count, 0..1);
+}

@@ -1,0 +1,261 @@
+//! Buffers of an asset, and of a frame's rays and lights.
+
+use super::bindings::{Slot, empty_buffer, filled_buffer, group, layout};
+use super::uniforms::{LightRecord, MediumUniform, ViewUniform};
+use crate::cpu::surface::corner_normals;
+use crate::exact::ExactDepths;
+use crate::frame::Frame;
+use crate::usable::usable_samples;
+use crate::{Error, Result};
+use diaphane_formats::asset::Asset;
+use diaphane_formats::{kernel, sh};
+use wgpu::{BindGroup, BindGroupLayout, Buffer, BufferBinding, BufferUsages, Device, Queue, ShaderStages};
+
+/// Everything that stays as long as the asset does.
+pub(super) struct AssetBuffers {
+    pub medium: Buffer,
+    pub positions: Buffer,
+    pub triangles: Buffer,
+    pub normals: Buffer,
+    pub samples: Buffer,
+    pub weights: Buffer,
+    pub depth: Buffer,
+    pub boundary: Buffer,
+    pub recurrence: Buffer,
+    pub grid: Buffer,
+    /// Written by the lighting pass.
+    pub sources: Buffer,
+    pub sample_count: u32,
+    pub samples_drawn: u64,
+    pub triangle_count: u32,
+    pub diagonal: f32,
+    pub fresnel: bool,
+    pub heterogeneous: bool,
+    pub grey: bool,
+}
+
+impl AssetBuffers {
+    /// Uploads an asset.
+    ///
+    /// # Errors
+    /// An asset that makes no sense, or one that is too large for the adapter's buffers.
+    pub fn new(device: &Device, asset: &Asset) -> Result<Self> {
+        asset.validate()?;
+        let (samples, info) = (usable_samples(asset), &asset.info);
+        let fresnel = info.ior != 1.0;
+        let kernels: Vec<[f32; 4]> = samples
+            .position_radius
+            .iter()
+            .map(|&[x, y, z, radius]| [x, y, z, kernel::sharpness(radius, info.width_factor)])
+            .collect();
+        let normals = if fresnel {
+            corner_normals(&asset.mesh()?)
+        } else {
+            Vec::new()
+        };
+        let recurrence: Vec<[f32; 4]> = sh::shader_table()
+            .iter()
+            .map(|&[a, b]| [a, b, 0.0, 0.0])
+            .collect();
+        let grid = asset.density.as_ref().map_or(&[][..], |g| &g.values);
+        let medium = MediumUniform::new(asset);
+        let limits = device.limits();
+        let most = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
+        let largest = [
+            4 * samples.depth.len(),
+            4 * samples.boundary.len(),
+            16 * kernels.len(),
+            36 * asset.mesh_triangles.len(),
+            12 * asset.mesh_positions.len(),
+            4 * grid.len(),
+        ];
+        if let Some(size) = largest.into_iter().map(|s| s as u64).max().filter(|&s| s > most) {
+            return Err(Error::Gpu(format!(
+                "the asset needs a buffer of {} MiB, the adapter allows {} MiB",
+                size >> 20,
+                most >> 20
+            )));
+        }
+        if asset.mesh_triangles.len() > (u32::MAX / 3) as usize {
+            return Err(Error::Gpu("the mesh has too many triangles".to_owned()));
+        }
+        let storage = BufferUsages::STORAGE;
+        Ok(Self {
+            positions: filled_buffer(device, "positions", &asset.mesh_positions, storage),
+            triangles: filled_buffer(device, "triangles", &asset.mesh_triangles, storage),
+            normals: filled_buffer(device, "normals", normals.as_flattened(), storage),
+            samples: filled_buffer(device, "samples", &kernels, storage),
+            weights: filled_buffer(device, "weights", &samples.weight, storage),
+            depth: filled_buffer(device, "depth", &samples.depth, storage),
+            boundary: filled_buffer(device, "boundary", &samples.boundary, storage),
+            recurrence: filled_buffer(device, "recurrence", &recurrence, BufferUsages::UNIFORM),
+            grid: filled_buffer(device, "grid", grid, storage),
+            sources: empty_buffer(device, "sources", 16 * kernels.len() as u64, storage),
+            sample_count: kernels.len() as u32,
+            samples_drawn: samples.weight.iter().filter(|w| **w > 0.0).count() as u64,
+            triangle_count: asset.mesh_triangles.len() as u32,
+            diagonal: info.diagonal(),
+            fresnel,
+            heterogeneous: asset.density.is_some(),
+            grey: medium.is_grey(),
+            medium: filled_buffer(device, "medium", &[medium], BufferUsages::UNIFORM),
+        })
+    }
+}
+
+/// Distance between two rays' uniforms: the largest alignment that an adapter may ask for.
+pub(super) const VIEW_STRIDE: u64 = 256;
+
+/// Buffers that follow the frame. They grow when they must; [`Self::changed`] then tells that groups are stale.
+pub(super) struct FrameBuffers {
+    views: Buffer,
+    pub lights: Buffer,
+    pub exact: Buffer,
+    common: BindGroup,
+    changed: bool,
+}
+
+/// The layout of the group that all passes share: the ray's view and the medium.
+pub(super) fn common_layout(device: &Device) -> BindGroupLayout {
+    layout(
+        device,
+        "common",
+        ShaderStages::VERTEX_FRAGMENT | ShaderStages::COMPUTE,
+        &[Slot::Moving, Slot::Uniform],
+    )
+}
+
+fn common_group(device: &Device, layout: &BindGroupLayout, views: &Buffer, medium: &Buffer) -> BindGroup {
+    let view = wgpu::BindingResource::Buffer(BufferBinding {
+        buffer: views,
+        offset: 0,
+        size: wgpu::BufferSize::new(size_of::<ViewUniform>() as u64),
+    });
+    group(device, "common", layout, vec![view, medium.as_entire_binding()])
+}
+
+impl FrameBuffers {
+    /// Small buffers to start with.
+    pub fn new(device: &Device, common: &BindGroupLayout, asset: &AssetBuffers) -> Self {
+        let views = empty_buffer(
+            device,
+            "views",
+            VIEW_STRIDE,
+            BufferUsages::UNIFORM | BufferUsages::COPY_DST,
+        );
+        Self {
+            common: common_group(device, common, &views, &asset.medium),
+            views,
+            lights: empty_buffer(
+                device,
+                "lights",
+                64,
+                BufferUsages::STORAGE | BufferUsages::COPY_DST,
+            ),
+            exact: empty_buffer(
+                device,
+                "exact",
+                16,
+                BufferUsages::STORAGE | BufferUsages::COPY_DST,
+            ),
+            changed: true,
+        }
+    }
+
+    /// The shared group; set it with an offset of [`VIEW_STRIDE`] times the view's index.
+    pub fn common(&self) -> &BindGroup {
+        &self.common
+    }
+
+    /// Whether a buffer was replaced since the last call.
+    pub fn take_changed(&mut self) -> bool {
+        std::mem::take(&mut self.changed)
+    }
+
+    /// Writes the views of the rays to come, at multiples of [`VIEW_STRIDE`].
+    pub fn write_views(
+        &mut self,
+        device: &Device,
+        queue: &Queue,
+        layout: &BindGroupLayout,
+        asset: &AssetBuffers,
+        views: &[ViewUniform],
+    ) {
+        let mut bytes = vec![0; views.len() * VIEW_STRIDE as usize];
+        for (place, view) in bytes.chunks_exact_mut(VIEW_STRIDE as usize).zip(views) {
+            place[..size_of::<ViewUniform>()].copy_from_slice(bytemuck::bytes_of(view));
+        }
+        if self.views.size() < bytes.len() as u64 {
+            let usage = BufferUsages::UNIFORM | BufferUsages::COPY_DST;
+            self.views = empty_buffer(device, "views", bytes.len() as u64, usage);
+            self.common = common_group(device, layout, &self.views, &asset.medium);
+        }
+        queue.write_buffer(&self.views, 0, &bytes);
+    }
+
+    /// Writes the lights and the exact depth tables that serve some of them.
+    ///
+    /// # Errors
+    /// The tables are too large for the adapter's buffers.
+    pub fn write_lights(
+        &mut self,
+        device: &Device,
+        queue: &Queue,
+        asset: &AssetBuffers,
+        frame: &Frame,
+        exact: Option<&ExactDepths>,
+    ) -> Result<()> {
+        let mut tables: Vec<&[[f32; 2]]> = Vec::new();
+        let mut records = Vec::with_capacity(frame.lights.len());
+        for (i, light) in frame.lights.iter().enumerate() {
+            let table = exact
+                .and_then(|e| e.light(i))
+                .filter(|t| t.len() == asset.sample_count as usize);
+            let slot = table.map(|t| {
+                tables.push(t);
+                tables.len() as u32 - 1
+            });
+            records.push(LightRecord::new(light, slot));
+        }
+        let limits = device.limits();
+        let most = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
+        let table_bytes = 8 * u64::from(asset.sample_count);
+        let size = table_bytes * tables.len() as u64;
+        if size > most || (records.len() * size_of::<LightRecord>()) as u64 > most {
+            return Err(Error::Gpu(format!(
+                "{} lights with exact depths for {} samples do not fit the adapter's buffers ({} MiB)",
+                tables.len(),
+                asset.sample_count,
+                most >> 20
+            )));
+        }
+        self.changed |= grow(
+            device,
+            &mut self.lights,
+            "lights",
+            (records.len() * size_of::<LightRecord>()) as u64,
+        );
+        self.changed |= grow(device, &mut self.exact, "exact", size);
+        if !records.is_empty() {
+            queue.write_buffer(&self.lights, 0, bytemuck::cast_slice(&records));
+        }
+        for (k, table) in tables.iter().enumerate() {
+            queue.write_buffer(&self.exact, k as u64 * table_bytes, bytemuck::cast_slice(table));
+        }
+        Ok(())
+    }
+}
+
+/// Replaces a storage buffer that is too small; says whether it did.
+fn grow(device: &Device, buffer: &mut Buffer, label: &str, size: u64) -> bool {
+    let small = buffer.size() < size;
+    if small {
+        *buffer = empty_buffer(
+            device,
+            label,
+            size,
+            BufferUsages::STORAGE | BufferUsages::COPY_DST,
+        );
+    }
+    small
+}

@@ -1,0 +1,49 @@
+//! The shaders' source: one file for each pass, with the shared snippets that it uses in front.
+
+use wgpu::{Device, ShaderModule, ShaderModuleDescriptor, ShaderSource};
+
+macro_rules! source {
+    ($($file:literal),*) => { concat!($(include_str!(concat!("../shaders/", $file, ".wgsl")), "\n"),*) };
+}
+
+pub(super) const SURFACE: &str = source!("shared/view", "surface");
+pub(super) const BOUNDARY: &str = source!(
+    "shared/view",
+    "shared/medium",
+    "shared/light",
+    "shared/fresnel",
+    "surface",
+    "boundary"
+);
+pub(super) const SEGMENTS: &str = source!("shared/view", "shared/medium", "segments");
+pub(super) const PROFILE: &str = source!("shared/view", "shared/medium", "shared/profile", "profile");
+pub(super) const LIGHTING: &str = source!(
+    "shared/view",
+    "shared/medium",
+    "shared/light",
+    "shared/phase",
+    "shared/sh",
+    "lighting"
+);
+pub(super) const SPLAT: &str = source!(
+    "shared/view",
+    "shared/medium",
+    "shared/kernel",
+    "shared/profile",
+    "splat"
+);
+pub(super) const RESOLVE: &str = source!(
+    "shared/view",
+    "shared/medium",
+    "shared/kernel",
+    "shared/profile",
+    "resolve"
+);
+
+/// Compiles a shader.
+pub(super) fn module(device: &Device, label: &str, source: &'static str) -> ShaderModule {
+    device.create_shader_module(ShaderModuleDescriptor {
+        label: Some(label),
+        source: ShaderSource::Wgsl(source.into()),
+    })
+}

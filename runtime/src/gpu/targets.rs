@@ -1,0 +1,129 @@
+//! State of the pixels of one tile.
+
+use super::bindings::empty_buffer;
+use super::scene::AssetBuffers;
+use super::tiles::{Budget, Tile};
+use crate::rendered::MAX_PIECES;
+use diaphane_formats::reconstruct::PROFILE_CELLS;
+use wgpu::{
+    Buffer, BufferBinding, BufferUsages, Device, Extent3d, TextureDescriptor, TextureDimension,
+    TextureFormat, TextureUsages, TextureView,
+};
+
+/// Format of the sums of the splat pass; half precision loses several percent in them.
+pub(super) const SUM_FORMAT: TextureFormat = TextureFormat::Rgba32Float;
+/// Format of the attachment that the surface pass does not write.
+pub(super) const MARKER_FORMAT: TextureFormat = TextureFormat::R8Unorm;
+/// Bytes of one piece's indirect arguments: a draw (four words), a dispatch (three), one unused.
+pub(super) const ARGUMENTS: u64 = 32;
+
+/// State of all pixels together stays below this, so that large pictures leave memory to others.
+const TOTAL: u64 = 512 << 20;
+
+const CROSSINGS: u64 = 40;
+const BOUNDARY: u64 = 48;
+const PIECE: u64 = 16;
+const PROFILE: u64 = 8 * (PROFILE_CELLS as u64 + 1);
+
+/// Buffers and textures for a tile of a given number of columns and rows.
+pub(super) struct Targets {
+    pub size: [u32; 2],
+    /// Pixels, padded so that each piece's part starts at a multiple of 256 bytes.
+    stride: u64,
+    pub crossings: Buffer,
+    pub boundary: Buffer,
+    pub pieces: Buffer,
+    pub front: Buffer,
+    pub radiance: Buffer,
+    pub counters: Buffer,
+    pub profile: Buffer,
+    pub arguments: Buffer,
+    pub marker: TextureView,
+    pub numerator: TextureView,
+    pub denominator: TextureView,
+}
+
+/// How large tiles may be.
+pub(super) fn budget(device: &Device, asset: &AssetBuffers) -> Budget {
+    let limits = device.limits();
+    let profile = if asset.heterogeneous { PROFILE } else { 0 };
+    let boundary = if asset.fresnel { BOUNDARY } else { 0 };
+    let pieces = PIECE * MAX_PIECES as u64;
+    Budget {
+        side: limits.max_texture_dimension_2d,
+        binding: limits.max_storage_buffer_binding_size.min(limits.max_buffer_size),
+        total: TOTAL,
+        pixel_binding: profile.max(pieces),
+        // Three vectors of state, two textures, the marker, and what is read back.
+        pixel_total: CROSSINGS + boundary + pieces + profile + 3 * 16 + 2 * 16 + 1 + 2 * 16,
+    }
+}
+
+impl Targets {
+    /// Targets for tiles up to the size of `tile`.
+    pub fn new(device: &Device, asset: &AssetBuffers, tile: Tile) -> Self {
+        let pixels = tile.pixels();
+        let stride = pixels.next_multiple_of(16);
+        let state = BufferUsages::STORAGE | BufferUsages::COPY_DST;
+        let read = state | BufferUsages::COPY_SRC;
+        let buffer = |label: &str, size: u64, usage| empty_buffer(device, label, size, usage);
+        let texture = |label: &str, format| {
+            let texture = device.create_texture(&TextureDescriptor {
+                label: Some(label),
+                size: Extent3d {
+                    width: tile.size[0],
+                    height: tile.size[1],
+                    depth_or_array_layers: 1,
+                },
+                mip_level_count: 1,
+                sample_count: 1,
+                dimension: TextureDimension::D2,
+                format,
+                usage: TextureUsages::RENDER_ATTACHMENT | TextureUsages::TEXTURE_BINDING,
+                view_formats: &[],
+            });
+            texture.create_view(&Default::default())
+        };
+        Self {
+            size: tile.size,
+            stride,
+            crossings: buffer("crossings", CROSSINGS * pixels, state),
+            boundary: buffer(
+                "boundary",
+                if asset.fresnel { BOUNDARY * pixels } else { 0 },
+                state,
+            ),
+            pieces: buffer("pieces", PIECE * MAX_PIECES as u64 * stride, read),
+            front: buffer("front", 16 * pixels, state),
+            radiance: buffer("radiance", 16 * pixels, read),
+            counters: buffer("counters", 16 * pixels, read),
+            profile: buffer(
+                "profile",
+                if asset.heterogeneous { PROFILE * stride } else { 0 },
+                state,
+            ),
+            arguments: buffer(
+                "arguments",
+                ARGUMENTS * MAX_PIECES as u64,
+                state | BufferUsages::INDIRECT,
+            ),
+            marker: texture("marker", MARKER_FORMAT),
+            numerator: texture("numerator", SUM_FORMAT),
+            denominator: texture("denominator", SUM_FORMAT),
+        }
+    }
+
+    /// Piece `k` of every pixel.
+    pub fn piece(&self, k: usize) -> wgpu::BindingResource<'_> {
+        wgpu::BindingResource::Buffer(BufferBinding {
+            buffer: &self.pieces,
+            offset: k as u64 * self.stride * PIECE,
+            size: wgpu::BufferSize::new(self.stride * PIECE),
+        })
+    }
+
+    /// Distance between the pieces of a pixel in `pieces`, in pixels.
+    pub fn stride(&self) -> usize {
+        self.stride as usize
+    }
+}

@@ -1,0 +1,320 @@
+//! The GPU against its CPU twin, on synthetic assets. Without an adapter the tests say "skipped" and pass, unless
+//! DIAPHANE_REQUIRE_GPU=1 asks them to fail.
+
+mod objects;
+mod scenes;
+
+use diaphane_formats::asset::Asset;
+use diaphane_formats::encoding::Encoding;
+use diaphane_formats::phase::Phase;
+use diaphane_runtime::cpu::CpuRenderer;
+use diaphane_runtime::exact::{DepthTracer, ExactDepths};
+use diaphane_runtime::frame::Frame;
+use diaphane_runtime::gpu::GpuRenderer;
+use diaphane_runtime::rendered::RayResult;
+use objects::{Object, ball, torus, uneven_grid};
+use scenes::{inside, level, outside, scene};
+
+/// A renderer, or `None` after saying why.
+fn gpu(asset: &Asset) -> Option<GpuRenderer> {
+    match GpuRenderer::new(asset) {
+        Ok(gpu) => Some(gpu),
+        Err(e) if std::env::var_os("DIAPHANE_REQUIRE_GPU").is_none_or(|v| v != "1") => {
+            eprintln!("skipped: no adapter ({e})");
+            None
+        }
+        Err(e) => panic!("a GPU is required here: {e}"),
+    }
+}
+
+/// Whether two rays have the same pieces: their ends within 1e-5 diagonals, and met the same faces at an edge (seen by
+/// the boundary's transmittance where that is not 1).
+fn same_pieces(a: &RayResult, b: &RayResult, diagonal: f32) -> bool {
+    let near = |x: f32, y: f32| (x - y).abs() <= 1e-5 * diagonal;
+    let same = |k: usize| {
+        let (p, q) = (a.pieces[k], b.pieces[k]);
+        near(p.0, q.0) && near(p.1, q.1) && (a.boundary[k] - b.boundary[k]).abs() <= 1e-5
+    };
+    a.count == b.count && (0..a.count as usize).all(same)
+}
+
+/// One ray of every pixel on both backends: largest difference 1e-4 of the peak where the pieces agree to 1e-5
+/// diagonals, and they do on 99.5 % of the rays.
+fn compare_rays(name: &str, asset: &Asset, frame: &Frame, exact: Option<&ExactDepths>) {
+    let Some(mut gpu) = gpu(asset) else { return };
+    let cpu = CpuRenderer::new(asset).unwrap();
+    let sources = cpu.sources(frame, exact);
+    let (mut rays, mut agreeing, mut hits) = (0usize, 0usize, 0usize);
+    let (mut worst, mut peak, mut elsewhere) = (0.0f32, 0.0f32, 0.0f32);
+    for offset in [[0.5, 0.5], [0.125, 0.875]] {
+        let expected = cpu.trace_rays(frame, &sources, offset);
+        let got = gpu.trace_rays(frame, exact, offset).unwrap();
+        assert_eq!(got.len(), expected.len());
+        for (a, b) in got.iter().zip(&expected) {
+            let difference = (0..3)
+                .map(|c| (a.radiance[c] - b.radiance[c]).abs())
+                .fold(0.0, f32::max);
+            assert!(a.radiance.iter().all(|v| v.is_finite()));
+            peak = b.radiance.iter().fold(peak, |p, v| p.max(*v));
+            rays += 1;
+            hits += usize::from(b.count > 0);
+            if same_pieces(a, b, asset.info.diagonal()) {
+                agreeing += 1;
+                worst = worst.max(difference);
+            } else {
+                elsewhere = elsewhere.max(difference);
+            }
+        }
+    }
+    let relative = worst / peak;
+    println!(
+        "{name} on {}: {} samples, {rays} rays, {hits} hit, {} disagree in their pieces; largest difference \
+         {relative:.1e} of the peak {peak:.3} ({:.1e} on the others)",
+        gpu.adapter(),
+        asset.samples.len(),
+        rays - agreeing,
+        elsewhere / peak
+    );
+    assert!(peak > 0.0 && hits * 5 > rays, "{name} shows nothing");
+    assert!(
+        rays - agreeing <= hits / 200,
+        "{name}: {} of {hits} rays disagree",
+        rays - agreeing
+    );
+    assert!(relative <= 1e-4, "{name}: {relative}");
+}
+
+#[test]
+fn ball_from_outside() {
+    let asset = ball().build();
+    compare_rays(
+        "ball",
+        &asset,
+        &Frame::new(&scene(outside()), &asset.info).unwrap(),
+        None,
+    );
+}
+
+#[test]
+fn coloured_extinction_and_forward_phase() {
+    let phase = Phase::HenyeyGreenstein { g: 0.6 };
+    let asset = Object {
+        extinction: [2.0, 5.0, 11.0],
+        phase,
+        order: 7,
+        ..ball()
+    }
+    .build();
+    compare_rays(
+        "coloured ball",
+        &asset,
+        &Frame::new(&scene(outside()), &asset.info).unwrap(),
+        None,
+    );
+}
+
+#[test]
+fn stored_transmittance_at_low_and_high_order() {
+    for order in [1, 10] {
+        let asset = Object {
+            encoding: Encoding::Transmittance,
+            order,
+            spacing: 0.3,
+            ..ball()
+        }
+        .build();
+        compare_rays(
+            "transmittance",
+            &asset,
+            &Frame::new(&scene(outside()), &asset.info).unwrap(),
+            None,
+        );
+    }
+}
+
+#[test]
+fn density_grid() {
+    let asset = Object {
+        density: Some(uneven_grid()),
+        ..ball()
+    }
+    .build();
+    compare_rays(
+        "uneven ball",
+        &asset,
+        &Frame::new(&scene(outside()), &asset.info).unwrap(),
+        None,
+    );
+    let asset = Object {
+        density: Some(uneven_grid()),
+        extinction: [2.0, 5.0, 11.0],
+        ..torus()
+    }
+    .build();
+    compare_rays(
+        "uneven torus",
+        &asset,
+        &Frame::new(&scene(outside()), &asset.info).unwrap(),
+        None,
+    );
+}
+
+#[test]
+fn refracting_boundary() {
+    let asset = Object { ior: 1.5, ..ball() }.build();
+    compare_rays(
+        "glassy ball",
+        &asset,
+        &Frame::new(&scene(outside()), &asset.info).unwrap(),
+        None,
+    );
+    let asset = Object { ior: 1.3, ..torus() }.build();
+    compare_rays(
+        "glassy torus",
+        &asset,
+        &Frame::new(&scene(outside()), &asset.info).unwrap(),
+        None,
+    );
+}
+
+#[test]
+fn camera_inside() {
+    for object in [
+        ball(),
+        Object {
+            density: Some(uneven_grid()),
+            ior: 1.5,
+            ..ball()
+        },
+    ] {
+        let asset = object.build();
+        compare_rays(
+            "ball from inside",
+            &asset,
+            &Frame::new(&scene(inside()), &asset.info).unwrap(),
+            None,
+        );
+    }
+}
+
+#[test]
+fn two_pieces_of_a_torus() {
+    let asset = torus().build();
+    let frame = Frame::new(&scene(level()), &asset.info).unwrap();
+    compare_rays("torus", &asset, &frame, None);
+    let Some(mut gpu) = gpu(&asset) else { return };
+    let rays = gpu.trace_rays(&frame, None, [0.5; 2]).unwrap();
+    assert!(
+        rays.iter().filter(|r| r.count == 2).count() > 500,
+        "the view runs through both sides"
+    );
+}
+
+#[test]
+fn exact_depths() {
+    let asset = Object { ior: 1.5, ..ball() }.build();
+    let mut scene = scene(outside());
+    scenes::put_light_inside(&mut scene);
+    let frame = Frame::new(&scene, &asset.info).unwrap();
+    let exact = DepthTracer::new(&asset)
+        .unwrap()
+        .trace(&frame, &[0, frame.scene_lights - 1]);
+    compare_rays("exact depths", &asset, &frame, Some(&exact));
+}
+
+#[test]
+fn whole_pictures_agree() {
+    // Every ray counts here, also those whose pieces differ: the bound is on the mean.
+    for object in [ball(), Object { ior: 1.5, ..torus() }] {
+        let asset = object.build();
+        let Some(mut gpu) = gpu(&asset) else { return };
+        let mut scene = scene(outside());
+        scene.surface.reflection = true;
+        scene.image.samples_per_pixel = 5;
+        let frame = Frame::new(&scene, &asset.info).unwrap();
+        let a = gpu.render(&frame, None).unwrap();
+        let b = CpuRenderer::new(&asset).unwrap().render(&frame, None);
+        assert_eq!(
+            (a.picture.width, a.picture.height),
+            (b.picture.width, b.picture.height)
+        );
+        let flat = |r: &diaphane_runtime::rendered::Rendered| -> Vec<f64> {
+            r.picture
+                .pixels
+                .as_flattened()
+                .iter()
+                .map(|v| f64::from(*v))
+                .collect()
+        };
+        let (x, y) = (flat(&a), flat(&b));
+        let square: f64 = y.iter().map(|v| v * v).sum();
+        let error: f64 = x.iter().zip(&y).map(|(p, q)| (p - q) * (p - q)).sum();
+        println!(
+            "picture: relative error {:.1e}, {:?}, {:?} against {:?}",
+            (error / square).sqrt(),
+            a.passes,
+            a.counters,
+            b.counters
+        );
+        assert!((error / square).sqrt() < 1e-3);
+        let near = |p: u64, q: u64| p.abs_diff(q) as f64 <= 1e-3 * q as f64 + 2.0;
+        let (p, q) = (a.counters, b.counters);
+        assert!(
+            p.rays == q.rays && p.samples_drawn == q.samples_drawn && p.pieces_dropped == q.pieces_dropped
+        );
+        assert!(near(p.rays_hit, q.rays_hit) && near(p.splats, q.splats) && near(p.uncovered, q.uncovered));
+        let coverage = a
+            .picture
+            .coverage
+            .as_ref()
+            .unwrap()
+            .iter()
+            .zip(b.picture.coverage.as_ref().unwrap());
+        assert!(coverage.filter(|(p, q)| (**p - **q).abs() > 0.01).count() < 20);
+    }
+}
+
+#[test]
+fn same_bits_every_time() {
+    let asset = torus().build();
+    let frame = Frame::new(&scene(outside()), &asset.info).unwrap();
+    let (Some(mut first), Some(mut second)) = (gpu(&asset), gpu(&asset)) else {
+        return;
+    };
+    let picture = first.render(&frame, None).unwrap().picture;
+    assert!(picture == first.render(&frame, None).unwrap().picture);
+    assert!(picture == second.render(&frame, None).unwrap().picture);
+}
+
+#[test]
+fn size_and_lights_may_change() {
+    let asset = ball().build();
+    let Some(mut gpu) = gpu(&asset) else { return };
+    let mut scene = scene(outside());
+    let full = gpu
+        .render(&Frame::new(&scene, &asset.info).unwrap(), None)
+        .unwrap();
+    scene.lights.clear();
+    (scene.image.width, scene.image.height) = (17, 31);
+    let dark = gpu
+        .render(&Frame::new(&scene, &asset.info).unwrap(), None)
+        .unwrap();
+    assert!(dark.picture.pixels.iter().all(|p| *p == [0.0; 3]) && dark.counters.rays_hit > 0);
+    let again = gpu
+        .render(&Frame::new(&scenes::scene(outside()), &asset.info).unwrap(), None)
+        .unwrap();
+    assert!(full.picture == again.picture);
+}
+
+#[test]
+fn no_samples_no_light() {
+    let mut object = ball();
+    object.inside = |_| false;
+    let asset = object.build();
+    let Some(mut gpu) = gpu(&asset) else { return };
+    let rendered = gpu
+        .render(&Frame::new(&scene(outside()), &asset.info).unwrap(), None)
+        .unwrap();
+    assert!(rendered.picture.pixels.iter().all(|p| *p == [0.0; 3]));
+    assert_eq!(rendered.counters.uncovered, rendered.counters.rays_hit);
+}

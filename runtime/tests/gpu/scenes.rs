@@ -1,0 +1,76 @@
+//! Cameras and lights around the objects, whose centre is at (10, -20, 5).
+
+use diaphane_formats::scene::{Camera, ImageSize, Light, Scene, Surface};
+use glam::DVec3;
+
+const CENTRE: DVec3 = DVec3::new(10.0, -20.0, 5.0);
+
+pub fn outside() -> Camera {
+    Camera {
+        position: CENTRE + DVec3::new(0.7, 1.1, 3.4),
+        target: CENTRE,
+        up: DVec3::Y,
+        vertical_fov_degrees: 36.0,
+    }
+}
+
+/// Looks along the plane of the torus.
+pub fn level() -> Camera {
+    Camera {
+        position: CENTRE + DVec3::new(0.4, 0.2, 3.0),
+        ..outside()
+    }
+}
+
+pub fn inside() -> Camera {
+    Camera {
+        position: CENTRE + DVec3::new(0.2, -0.3, 0.4),
+        target: CENTRE + DVec3::new(0.4, 0.0, -0.4),
+        up: DVec3::Y,
+        vertical_fov_degrees: 70.0,
+    }
+}
+
+/// One light of every kind.
+pub fn scene(camera: Camera) -> Scene {
+    Scene {
+        camera,
+        image: ImageSize {
+            width: 112,
+            height: 96,
+            samples_per_pixel: 1,
+        },
+        surface: Surface {
+            reflection: false,
+            specular: 0.5,
+            roughness: 0.3,
+        },
+        environment: None,
+        lights: vec![
+            Light::Point {
+                position: CENTRE + DVec3::new(2.2, 1.2, 1.0),
+                intensity: DVec3::new(30.0, 10.0, 6.0),
+            },
+            Light::Directional {
+                direction: DVec3::new(0.6, -0.8, 0.0),
+                irradiance: DVec3::new(0.5, 1.0, 2.0),
+            },
+            Light::Spot {
+                position: CENTRE + DVec3::new(-1.0, 2.5, 2.0),
+                direction: DVec3::new(1.0, -2.5, -2.0).normalize(),
+                intensity: DVec3::new(20.0, 20.0, 20.0),
+                cos_inner: 8f64.to_radians().cos(),
+                cos_outer: 14f64.to_radians().cos(),
+            },
+        ],
+    }
+}
+
+/// Adds a light where only exact depths are right.
+pub fn put_light_inside(scene: &mut Scene) {
+    let position = CENTRE + DVec3::new(0.1, 0.3, 0.2);
+    scene.lights.push(Light::Point {
+        position,
+        intensity: DVec3::new(0.3, 0.2, 0.1),
+    });
+}
