@@ -107,13 +107,14 @@ impl Renderer {
         tiles: &[Tile],
         offsets: &[[f32; 2]],
     ) {
-        let view = |tile: &Tile| {
-            let tile = *tile;
-            offsets
-                .iter()
-                .map(move |o| ViewUniform::new(frame, self.asset.diagonal, tile, *o))
-        };
-        let views: Vec<ViewUniform> = tiles.iter().flat_map(view).collect();
+        let mut views = Vec::with_capacity(tiles.len() * offsets.len());
+        for &tile in tiles {
+            views.extend(
+                offsets
+                    .iter()
+                    .map(|&o| ViewUniform::new(frame, self.asset.diagonal, tile, o)),
+            );
+        }
         self.frame
             .write_views(device, queue, &self.common, &self.asset, &views);
     }
