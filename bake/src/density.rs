@@ -4,14 +4,13 @@
 //! finite differences). Every layer vertex is evaluated twice, at the top and at the bottom of the slab beneath it, so
 //! that any point between can be interpolated.
 
-use crate::Result;
+use crate::{Prepared, Result};
 use crate::field::Shape;
 use crate::layers::Layer;
 use crate::params::{DENSITY_DIRECTIONS, Params};
 use crate::progress::Stage;
 use diaphane_formats::directions::{even_directions, hash};
-use diaphane_formats::medium::Medium;
-use diaphane_formats::visibility::project;
+use diaphane_formats::visibility::project_with;
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -24,7 +23,7 @@ pub(crate) struct LayerFluence {
 pub(crate) fn evaluate(
     shape: &Shape<'_>,
     layers: &[Layer],
-    medium: &Medium,
+    medium: &Prepared<'_>,
     params: &Params,
     stage: Stage<'_>,
 ) -> Result<LayerFluence> {
@@ -51,13 +50,13 @@ pub(crate) fn evaluate(
 /// what lies in front of them, which is what a sample near them would see.
 fn fluence(
     shape: &Shape<'_>,
-    medium: &Medium,
+    medium: &Prepared<'_>,
     points: &[DVec3],
     count: usize,
     seed: u64,
     stage: Stage<'_>,
 ) -> Result<Vec<f32>> {
-    let kappa = medium.reference_extinction() as f32;
+    let kappa = medium.medium.reference_extinction() as f32;
     let axes: Vec<DVec3> = even_directions(count, seed).into_iter().step_by(2).collect();
     stage.expect(axes.len());
     let mut sum = vec![0.0f32; points.len()];
@@ -66,7 +65,7 @@ fn fluence(
         let rows: Vec<_> = group
             .par_iter()
             .map(|axis| {
-                let rows = project(shape.mesh, medium, points, *axis);
+                let rows = project_with(shape.mesh, medium.medium, medium.for_rays(), points, *axis);
                 stage.step(1)?;
                 Ok(rows)
             })

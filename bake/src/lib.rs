@@ -21,7 +21,7 @@ mod samples;
 pub use error::{Error, Result};
 
 use diaphane_formats::asset::Asset;
-use diaphane_formats::medium::Medium;
+use diaphane_formats::medium::{Density, Medium, SampledDensity};
 use diaphane_formats::mesh::{Mesh, MeshReport};
 use params::Params;
 use progress::{Progress, Timed};
@@ -41,6 +41,28 @@ pub struct Input<'a> {
     pub material_name: String,
 }
 
+/// The medium with what its integrals need.
+pub(crate) struct Prepared<'a> {
+    pub medium: &'a Medium,
+    /// The density on voxels: for the bake where it has no closed form, for the player unless it is a grid already.
+    pub sampled: Option<SampledDensity>,
+}
+
+impl<'a> Prepared<'a> {
+    fn new(medium: &'a Medium, mesh: &Mesh) -> Self {
+        let (low, high) = mesh.bounds();
+        let carried = matches!(medium.density_field(), Density::Uniform(_) | Density::Grid(_));
+        let needed = !carried || !medium.has_closed_form();
+        let sampled = needed.then(|| SampledDensity::new(medium, low, high, params::DENSITY_VOXELS));
+        Self { medium, sampled }
+    }
+
+    /// The sampled density if rays should use it.
+    pub fn for_rays(&self) -> Option<&SampledDensity> {
+        self.sampled.as_ref().filter(|_| !self.medium.has_closed_form())
+    }
+}
+
 /// Bakes `input`. The same input, parameters and version give the same asset, whatever the number of threads.
 ///
 /// # Errors
@@ -49,13 +71,14 @@ pub fn bake(input: &Input<'_>, params: &Params, progress: &dyn Progress) -> Resu
     params.validate()?;
     let mut timed = Timed::new(progress);
     let shape = timed.stage("distance field", |p| field::Shape::new(input.mesh, params, p))?;
+    let medium = timed.stage("medium", |_| Ok(Prepared::new(input.medium, input.mesh)))?;
     let layers = timed.stage("layers", |p| layers::build(&shape, input.medium, params, p))?;
-    let density = timed.stage("density", |p| density::evaluate(&shape, &layers, input.medium, params, p))?;
+    let density = timed.stage("density", |p| density::evaluate(&shape, &layers, &medium, params, p))?;
     let placed = timed.stage("samples", |p| samples::place(&shape, &layers, &density, input.medium, params, p))?;
-    let lit = timed.stage("optical depth", |p| fit::depths(&shape, input.medium, placed, params, p))?;
+    let lit = timed.stage("optical depth", |p| fit::depths(&shape, &medium, placed, params, p))?;
     let harmonics = timed.stage("harmonics", |p| fit::harmonics(&lit, input.medium, params, p))?;
     let weights = timed.stage("weights", |p| fit::weights(&lit, params, p))?;
-    let asset = timed.stage("packing", |_| pack::pack(input, params, &lit, harmonics, weights))?;
+    let asset = timed.stage("packing", |_| pack::pack(input, medium.sampled.as_ref(), params, &lit, harmonics, weights))?;
     let report = Report::new(params, &shape, &layers, &lit, &asset, timed.seconds);
     Ok((asset, report))
 }

@@ -4,19 +4,14 @@ use crate::fit::{Harmonics, Lit};
 use crate::params::Params;
 use crate::{Input, Result};
 use diaphane_formats::asset::{Asset, DensityGrid, Info, Provenance, Samples};
-use diaphane_formats::medium::{Density, Medium};
+use diaphane_formats::medium::{Density, Medium, SampledDensity};
 use diaphane_formats::mesh::Mesh;
 use glam::DVec3;
 use half::f16;
-use rayon::prelude::*;
-
-/// Voxels along the longest axis when a procedural density is sampled for the player.
-const GRID_SIDE: f64 = 112.0;
-/// Density is averaged over this many points along each axis of a voxel.
-const SUBVOXELS: usize = 3;
 
 pub(crate) fn pack(
     input: &Input<'_>,
+    sampled: Option<&SampledDensity>,
     params: &Params,
     lit: &Lit,
     harmonics: Harmonics,
@@ -63,7 +58,7 @@ pub(crate) fn pack(
         samples: Samples { position_radius, weight, depth: harmonics.depth, boundary: harmonics.boundary },
         mesh_positions: input.mesh.positions.iter().map(|p| local(*p)).collect(),
         mesh_triangles: input.mesh.triangles.clone(),
-        density: density_grid(medium, low, high, centre),
+        density: density_grid(medium, sampled, centre),
     };
     asset.validate()?;
     Ok(asset)
@@ -84,46 +79,25 @@ fn mesh_hash(mesh: &Mesh) -> [u8; 32] {
     *hasher.finalize().as_bytes()
 }
 
-/// A grid is carried as it is; other fields are sampled over the mesh's box, averaged over each voxel.
-fn density_grid(medium: &Medium, low: DVec3, high: DVec3, centre: DVec3) -> Option<DensityGrid> {
-    let half = |v: f64| f16::from_f64(v.min(65504.0));
-    match medium.density_field() {
-        Density::Uniform(_) => None,
-        Density::Grid(grid) => {
-            let (min, max) = grid.bounds();
-            Some(DensityGrid {
-                size: grid.size().map(|n| n as u32),
-                min: (min - centre).as_vec3().to_array(),
-                max: (max - centre).as_vec3().to_array(),
-                values: grid.values().iter().map(|v| [half(f64::from(*v)); 2]).collect(),
-            })
-        }
-        _ => {
-            let voxel = (high - low).max_element() / GRID_SIDE;
-            let size = ((high - low) / voxel).ceil().max(DVec3::ONE);
-            let max = low + size * voxel;
-            let [nx, ny, nz] = size.to_array().map(|n| n as usize);
-            let values = (0..nx * ny * nz)
-                .into_par_iter()
-                .map(|v| {
-                    let corner = DVec3::new((v % nx) as f64, (v / nx % ny) as f64, (v / (nx * ny)) as f64);
-                    let mut sum = (0.0, 0.0);
-                    for s in 0..SUBVOXELS.pow(3) {
-                        let part = [s % SUBVOXELS, s / SUBVOXELS % SUBVOXELS, s / (SUBVOXELS * SUBVOXELS)];
-                        let offset = DVec3::from(part.map(|p| (p as f64 + 0.5) / SUBVOXELS as f64));
-                        let (rho, scattering) = medium.density_and_scattering(low + (corner + offset) * voxel);
-                        sum = (sum.0 + rho, sum.1 + scattering);
-                    }
-                    let count = SUBVOXELS.pow(3) as f64;
-                    [half(sum.0 / count), half(sum.1 / count)]
-                })
-                .collect();
-            Some(DensityGrid {
-                size: [nx as u32, ny as u32, nz as u32],
-                min: (low - centre).as_vec3().to_array(),
-                max: (max - centre).as_vec3().to_array(),
-                values,
-            })
-        }
+/// A grid is carried as it is; other fields as they were sampled over the mesh's box.
+fn density_grid(medium: &Medium, sampled: Option<&SampledDensity>, centre: DVec3) -> Option<DensityGrid> {
+    let half = |v: f32| f16::from_f32(v.min(65504.0));
+    let local = |p: DVec3| (p - centre).as_vec3().to_array();
+    if let Density::Grid(grid) = medium.density_field() {
+        let (min, max) = grid.bounds();
+        return Some(DensityGrid {
+            size: grid.size().map(|n| n as u32),
+            min: local(min),
+            max: local(max),
+            values: grid.values().iter().map(|v| [half(*v); 2]).collect(),
+        });
     }
+    let sampled = sampled?;
+    let (min, max) = sampled.bounds();
+    Some(DensityGrid {
+        size: sampled.size().map(|n| n as u32),
+        min: local(min),
+        max: local(max),
+        values: sampled.values().iter().map(|v| v.map(half)).collect(),
+    })
 }

@@ -24,6 +24,9 @@ pub struct Params {
 /// Directions used to estimate the fluence on the layers.
 pub const DENSITY_DIRECTIONS: usize = 64;
 
+/// Voxels along the longest edge of the box when a density field without closed form is sampled.
+pub const DENSITY_VOXELS: usize = 112;
+
 /// Samples whose fluence, over 4π, stays below this are not stored.
 pub const DARK: f64 = 5e-3;
 

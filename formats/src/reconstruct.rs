@@ -10,6 +10,7 @@
 //! (FINDINGS of the project, section 2; the thesis sums v_i ∫γ_i dt alone, equation 3.4.)
 
 use crate::asset::{DensityGrid, Samples};
+use crate::hits::{Hit, Hits};
 use crate::kernel;
 use glam::{Vec3, Vec3A};
 use obvhs::BvhBuildParams;
@@ -163,23 +164,6 @@ impl Along {
             }
         }
     }
-
-    /// W_i without w_i: `grey` computes one channel and repeats it.
-    fn kernel_weight(&self, grey: bool, a: f32, d2: f32, tc: f32, start: f32, from: f32, to: f32) -> Vec3 {
-        let (kappa, before, density) = match self {
-            Self::Uniform(kappa) => (*kappa, from - start, 1.0),
-            Self::Profile(kappa, p) => {
-                let (first, last) = (p.at(from), p.at(to));
-                let inverse = 1.0 / (to - from);
-                let slope = (last[0] - first[0]) * inverse;
-                let scattering = (last[1] - first[1]) * inverse;
-                let weigh = |k: f32| scattering * (-k * first[0]).exp() * kernel::integral(a, d2, tc, k * slope, from, to);
-                return if grey { Vec3::splat(weigh(kappa.x)) } else { kappa.to_array().map(weigh).into() };
-            }
-        };
-        let weigh = |k: f32| density * (-k * before).exp() * kernel::integral(a, d2, tc, k, from, to);
-        if grey { Vec3::splat(weigh(kappa.x)) } else { kappa.to_array().map(weigh).into() }
-    }
 }
 
 /// Sum over one inside piece.
@@ -201,26 +185,17 @@ pub fn piece_radiance(
     end: f32,
     along: &Along,
 ) -> PieceSum {
-    let kappa = match along {
-        Along::Uniform(k) | Along::Profile(k, _) => *k,
-    };
-    let grey = kappa.x == kappa.y && kappa.y == kappa.z;
-    let (mut numerator, mut denominator, mut splats) = (Vec3::ZERO, Vec3::ZERO, 0);
+    let mut hits = Hits::default();
     cloud.for_each_near_ray(origin, direction, start, end, |i| {
         let to_centre = cloud.centre[i] - origin;
         let tc = to_centre.dot(direction);
         let d2 = (to_centre - direction * tc).length_squared();
         let a = cloud.sharpness[i];
-        if let Some((from, to)) = kernel::clip(a, d2, tc, start, end) {
-            let w = cloud.weight[i] * along.kernel_weight(grey, a, d2, tc, start, from, to);
-            numerator += source[i] * w;
-            denominator += w;
-            splats += 1;
+        if a * a * d2 < kernel::CUT_OFF {
+            hits.push(Hit { tc, d2, a, weight: cloud.weight[i], source: source[i] });
         }
     });
-    let emission = along.emission(start, end);
-    let mean = |k: usize| if denominator[k] > 0.0 { numerator[k] / denominator[k] } else { 0.0 };
-    PieceSum { radiance: emission * Vec3::new(mean(0), mean(1), mean(2)), splats }
+    hits.piece_radiance(start, end, along)
 }
 
 #[cfg(test)]
@@ -274,6 +249,64 @@ mod tests {
         let y = piece_radiance(&cloud, &source, origin, direction, 2.3, 3.7, &b);
         assert!((x.radiance - y.radiance).length() < 1e-4 * y.radiance.length(), "{x:?} {y:?}");
         assert!((a.transmittance(2.3, 3.7) - b.transmittance(2.3, 3.7)).length() < 1e-5);
+    }
+
+    /// The sum of the module's head, kernel by kernel without lanes or hierarchy.
+    fn simple(cloud: &Cloud, source: &[Vec3], origin: Vec3, direction: Vec3, ends: [f32; 2], along: &Along) -> PieceSum {
+        let [start, end] = ends;
+        let (mut numerator, mut denominator, mut splats) = (Vec3::ZERO, Vec3::ZERO, 0);
+        for (i, centre) in cloud.centre.iter().enumerate() {
+            let tc = (*centre - origin).dot(direction);
+            let d2 = (*centre - origin - direction * tc).length_squared();
+            let a = cloud.sharpness[i];
+            let Some((from, to)) = kernel::clip(a, d2, tc, start, end) else { continue };
+            let weigh = |k: f32| match along {
+                Along::Uniform(_) => (-k * (from - start)).exp() * kernel::integral(a, d2, tc, k, from, to),
+                Along::Profile(_, p) => {
+                    let (first, last) = (p.at(from), p.at(to));
+                    let [slope, scattering] = [0, 1].map(|c| (last[c] - first[c]) / (to - from));
+                    scattering * (-k * first[0]).exp() * kernel::integral(a, d2, tc, k * slope, from, to)
+                }
+            };
+            let (Along::Uniform(kappa) | Along::Profile(kappa, _)) = along;
+            let w = cloud.weight[i] * Vec3::from(kappa.to_array().map(weigh));
+            numerator += source[i] * w;
+            denominator += w;
+            splats += 1;
+        }
+        let mean = Vec3::select(denominator.cmpgt(Vec3::ZERO), numerator / denominator, Vec3::ZERO);
+        PieceSum { radiance: along.emission(start, end) * mean, splats }
+    }
+
+    #[test]
+    fn lanes_agree_with_the_simple_sum() {
+        let mut cloud = cloud();
+        let unit = |i: u64, n: u64| crate::directions::hash(i, n) as f32 / 2f32.powi(64);
+        for (i, w) in cloud.weight.iter_mut().enumerate() {
+            *w = 0.5 + unit(1, i as u64);
+        }
+        let count = cloud.centre.len() as u64;
+        let source: Vec<Vec3> = (0..count).map(|i| Vec3::new(unit(i, 2), unit(i, 3), unit(i, 4))).collect();
+        let values = (0..512).map(|i| [unit(i, 5), unit(i, 6)].map(|v| half::f16::from_f32(2.0 * v))).collect();
+        let grid = DensityGrid { size: [8; 3], min: [-1.0; 3], max: [1.0; 3], values };
+        for i in 0..2000 {
+            let origin = Vec3::new(unit(i, 7), unit(i, 8), unit(i, 9)) * 0.4 + Vec3::Z * 3.0;
+            let direction = Vec3::new(unit(i, 10) - 0.5, unit(i, 11) - 0.5, -4.0).normalize();
+            let start = 1.8 + 1.4 * unit(i, 12);
+            let end = start + 0.002 + 1.4 * unit(i, 13) * unit(i, 14);
+            let scale = 10f32.powf(4.0 * unit(i, 15) - 2.0);
+            for kappa in [Vec3::splat(scale), Vec3::new(0.0, scale, 2.0 * scale)] {
+                let profile = Box::new(Profile::march(&grid, origin, direction, start, end));
+                for along in [Along::Uniform(kappa), Along::Profile(kappa, profile)] {
+                    let exact = simple(&cloud, &source, origin, direction, [start, end], &along);
+                    let got = piece_radiance(&cloud, &source, origin, direction, start, end, &along);
+                    let error = (got.radiance - exact.radiance).length();
+                    assert!(error <= 2e-5 * exact.radiance.length() + 1e-9, "{along:?} {got:?} {exact:?}");
+                    // Rounding at the rim of a support may count a kernel more or less.
+                    assert!(got.splats.abs_diff(exact.splats) <= 1);
+                }
+            }
+        }
     }
 
     #[test]

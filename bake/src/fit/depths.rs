@@ -4,10 +4,9 @@ use crate::field::Shape;
 use crate::params::{DARK, Params};
 use crate::progress::Stage;
 use crate::samples::{Candidate, Placed};
-use crate::{Error, Result};
+use crate::{Error, Prepared, Result};
 use diaphane_formats::directions::{even_directions, hash};
-use diaphane_formats::medium::Medium;
-use diaphane_formats::visibility::project;
+use diaphane_formats::visibility::project_with;
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -32,7 +31,7 @@ const GROUP: usize = 32;
 
 pub(crate) fn depths(
     shape: &Shape<'_>,
-    medium: &Medium,
+    medium: &Prepared<'_>,
     placed: Placed,
     params: &Params,
     stage: Stage<'_>,
@@ -41,7 +40,7 @@ pub(crate) fn depths(
     let points: Vec<DVec3> = placed.samples.iter().map(|s| s.position).collect();
     let (n, d) = (points.len(), directions.len());
     stage.expect(d.div_ceil(2));
-    let matched = medium.ior() == 1.0;
+    let matched = medium.medium.ior() == 1.0;
     let mut density_length = vec![0.0f32; n * d];
     let mut boundary = vec![1.0f32; if matched { 0 } else { n * d }];
     let mut outside_votes = vec![0u32; n];
@@ -49,7 +48,7 @@ pub(crate) fn depths(
         let rows: Vec<_> = group
             .par_chunks(2)
             .map(|pair| {
-                let rows = project(shape.mesh, medium, &points, pair[0]);
+                let rows = project_with(shape.mesh, medium.medium, medium.for_rays(), &points, pair[0]);
                 stage.step(1)?;
                 Ok(rows)
             })
@@ -77,7 +76,7 @@ pub(crate) fn depths(
             }
         });
     }
-    let kappa = medium.reference_extinction() as f32;
+    let kappa = medium.medium.reference_extinction() as f32;
     let keep: Vec<bool> = (0..n)
         .into_par_iter()
         .map(|i| {

@@ -56,6 +56,11 @@ impl Grid {
         Self::new([nx, ny, nz], min, max, values).map_err(|e| e.in_file(path))
     }
 
+    /// Whether the values vary along one axis only, so that integrals have a closed form.
+    pub fn is_column(&self) -> bool {
+        self.column.is_some()
+    }
+
     /// Voxels along x, y, z.
     pub fn size(&self) -> [usize; 3] {
         self.size

@@ -3,12 +3,14 @@
 mod field;
 mod grid;
 mod noise;
+mod sampled;
 mod shapes;
 
 pub use field::{Density, Layers};
 pub use grid::Grid;
 pub(crate) use grid::read_npy;
 pub use noise::Noise;
+pub use sampled::{RunningIntegral, SampledDensity};
 pub use shapes::{Shape, Shapes, Solid};
 
 use crate::phase::Phase;
@@ -85,6 +87,15 @@ impl Medium {
     /// ρ of a homogeneous medium (1 otherwise).
     pub fn uniform_density(&self) -> f64 {
         if let Density::Uniform(rho) = self.density { rho } else { 1.0 }
+    }
+
+    /// Whether ∫ρ along a ray is cheap: a closed form, not a march.
+    pub fn has_closed_form(&self) -> bool {
+        match &self.density {
+            Density::Uniform(_) | Density::Layers(_) => true,
+            Density::Grid(grid) => grid.is_column(),
+            Density::Noise(_) | Density::Shapes(_) => false,
+        }
     }
 
     /// ρ at a point.

@@ -6,5 +6,5 @@ mod project;
 mod rays;
 
 pub use accel::{Accel, Crossing, Nearest};
-pub use project::{DepthRows, project};
+pub use project::{DepthRows, project, project_with};
 pub use rays::{Depth, InsidePiece, depth_along, inside_pieces};

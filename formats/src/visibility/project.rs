@@ -8,7 +8,7 @@
 //! direction is one task.
 
 use crate::fresnel;
-use crate::medium::Medium;
+use crate::medium::{Medium, SampledDensity};
 use crate::mesh::Mesh;
 use glam::DVec3;
 
@@ -145,8 +145,22 @@ impl Projected {
     }
 }
 
-/// Depths of `points` through `mesh` along the unit vector `direction` and its opposite.
+/// Depths of `points` through `mesh` along the unit vector `direction` and its opposite, with the medium's own
+/// integrals along each ray.
 pub fn project(mesh: &Mesh, medium: &Medium, points: &[DVec3], direction: DVec3) -> DepthRows {
+    project_with(mesh, medium, None, points, direction)
+}
+
+/// As [`project`], with the density taken from a sampled field where one is given (for fields without closed form).
+pub fn project_with(
+    mesh: &Mesh,
+    medium: &Medium,
+    sampled: Option<&SampledDensity>,
+    points: &[DVec3],
+    direction: DVec3,
+) -> DepthRows {
+    let running = sampled.map(|s| s.running(direction));
+    let at_point: Vec<f64> = running.iter().flat_map(|r| points.iter().map(|p| r.at(*p))).collect();
     let n = points.len();
     let (u_axis, v_axis) = direction.any_orthonormal_pair();
     let frame = [u_axis, v_axis, direction];
@@ -170,6 +184,9 @@ pub fn project(mesh: &Mesh, medium: &Medium, points: &[DVec3], direction: DVec3)
                 winding[side][k] += if side == 0 { sign as i8 } else { -sign as i8 };
                 depth[side][k] += if homogeneous {
                     sign * distance
+                } else if let Some(running) = &running {
+                    let i = buckets.order[k] as usize;
+                    sign * (running.at(points[i] + direction * distance) - at_point[i])
                 } else {
                     let origin = points[buckets.order[k] as usize];
                     let (along, length) = if side == 0 { (direction, distance) } else { (-direction, -distance) };
