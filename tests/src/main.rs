@@ -7,7 +7,11 @@ use std::process::ExitCode;
 
 /// Checks translucent assets against a ray-marched reference.
 #[derive(Parser)]
-#[command(name = "diaphane-validate", version, after_help = "Exit codes: 0 done, 1 a check failed, 2 bad usage or bad input.")]
+#[command(
+    name = "diaphane-validate",
+    version,
+    after_help = "Exit codes: 0 done, 1 a check failed, 2 bad usage or bad input."
+)]
 struct Arguments {
     #[command(subcommand)]
     command: Command,

@@ -6,9 +6,11 @@ use validation::metrics::{Metrics, compare};
 
 /// Which pictures to compare.
 #[derive(clap::Args)]
-#[command(after_help = "Only pixels that the mesh covers fully count. Their mask is --coverage, else the reference's \
+#[command(
+    after_help = "Only pixels that the mesh covers fully count. Their mask is --coverage, else the reference's \
                         alpha, else the pixels where the reference is above 0.\n\nExample:\n  \
-                        diaphane-validate compare played.exr reference.exr --json")]
+                        diaphane-validate compare played.exr reference.exr --json"
+)]
 pub struct Arguments {
     /// Picture to judge (EXR, linear radiance)
     #[arg(value_name = "IMAGE")]
@@ -68,7 +70,10 @@ fn find_coverage(file: Option<&Path>, reference: &Picture) -> anyhow::Result<(Ve
         Some(coverage) => (coverage.clone(), "the reference's alpha".to_owned()),
         None => {
             let lit = |p: &[f32; 3]| f32::from(u8::from(p.iter().any(|v| *v > 0.0)));
-            (reference.pixels.iter().map(lit).collect(), "pixels above 0 in the reference".to_owned())
+            (
+                reference.pixels.iter().map(lit).collect(),
+                "pixels above 0 in the reference".to_owned(),
+            )
         }
     })
 }

@@ -44,7 +44,12 @@ impl Inputs {
         if scene.lights.is_empty() && scene.environment.is_none() {
             warnings.push("the scene has no lights; the picture will be black".to_owned());
         }
-        Ok(Loaded { mesh, medium, scene, warnings })
+        Ok(Loaded {
+            mesh,
+            medium,
+            scene,
+            warnings,
+        })
     }
 
     /// Fails when `output` is one of the inputs.

@@ -9,8 +9,10 @@ use validation::reference::{Reference, Settings, render};
 
 /// What to render and how well.
 #[derive(clap::Args)]
-#[command(after_help = "Example:\n  diaphane-validate reference bunny.obj --material jade.material.toml \\\n      \
-                        --scene studio.scene.toml --output bunny.exr --tolerance 0.01")]
+#[command(
+    after_help = "Example:\n  diaphane-validate reference bunny.obj --material jade.material.toml \\\n      \
+                        --scene studio.scene.toml --output bunny.exr --tolerance 0.01"
+)]
 pub struct Arguments {
     #[command(flatten)]
     inputs: Inputs,
@@ -28,25 +30,41 @@ pub struct Arguments {
 /// Renders and writes the picture.
 pub fn run(a: &Arguments) -> anyhow::Result<bool> {
     anyhow::ensure!(
-        a.output.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr")),
+        a.output
+            .extension()
+            .is_some_and(|e| e.eq_ignore_ascii_case("exr")),
         "'{}': the reference is linear radiance; name an .exr file",
         a.output.display()
     );
-    anyhow::ensure!(a.tolerance > 0.0 && a.tolerance.is_finite(), "--tolerance must be above 0, not {}", a.tolerance);
+    anyhow::ensure!(
+        a.tolerance > 0.0 && a.tolerance.is_finite(),
+        "--tolerance must be above 0, not {}",
+        a.tolerance
+    );
     let loaded = a.inputs.load()?;
     a.inputs.require_different(&a.output)?;
     files::require_writable(&a.output)?;
     for line in &loaded.warnings {
         eprintln!("warning: {line}");
     }
-    let settings = Settings { tolerance: a.tolerance, seed: a.seed, ..Settings::default() };
+    let settings = Settings {
+        tolerance: a.tolerance,
+        seed: a.seed,
+        ..Settings::default()
+    };
     let start = Instant::now();
     let display = Display::new("reference");
-    let reference =
-        render(&loaded.mesh, &loaded.medium, &loaded.scene, &settings, &|p| display.reference(p))?;
+    let reference = render(&loaded.mesh, &loaded.medium, &loaded.scene, &settings, &|p| {
+        display.reference(p)
+    })?;
     display.finish();
     picture::write_exr(&a.output, &reference.picture)?;
-    let Reference { picture, error, converged, rays } = &reference;
+    let Reference {
+        picture,
+        error,
+        converged,
+        rays,
+    } = &reference;
     println!(
         "{}: {} x {}, noise {:.3} %, {:.1} million rays, {:.1} s",
         a.output.display(),
@@ -57,7 +75,9 @@ pub fn run(a: &Arguments) -> anyhow::Result<bool> {
         start.elapsed().as_secs_f64()
     );
     if !converged {
-        eprintln!("warning: the noise is above the tolerance although every pixel has all samples it may have");
+        eprintln!(
+            "warning: the noise is above the tolerance although every pixel has all samples it may have"
+        );
     }
     Ok(*converged)
 }

@@ -8,7 +8,12 @@ const COARSE: usize = 4;
 const FINE: usize = 16;
 
 /// Fraction of each pixel's rays that pass through the object, and the number of rays traced.
-pub fn coverage(integrator: &Integrator, width: usize, height: usize, done: &(dyn Fn(usize) + Sync)) -> (Vec<f32>, u64) {
+pub fn coverage(
+    integrator: &Integrator,
+    width: usize,
+    height: usize,
+    done: &(dyn Fn(usize) + Sync),
+) -> (Vec<f32>, u64) {
     let pass = |pixels: &[usize], side: usize| -> Vec<f32> {
         let at = |k: usize| (k as f64 + 0.5) / side as f64;
         pixels
@@ -30,7 +35,10 @@ pub fn coverage(integrator: &Integrator, width: usize, height: usize, done: &(dy
     };
     let all: Vec<usize> = (0..width * height).collect();
     let mut cover = pass(&all, COARSE);
-    let edge: Vec<usize> = all.into_iter().filter(|&i| !is_flat(&cover, width, height, i)).collect();
+    let edge: Vec<usize> = all
+        .into_iter()
+        .filter(|&i| !is_flat(&cover, width, height, i))
+        .collect();
     let fine = pass(&edge, FINE);
     let rays = width * height * COARSE * COARSE + edge.len() * FINE * FINE;
     for (&i, value) in edge.iter().zip(fine) {

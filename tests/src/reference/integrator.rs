@@ -6,7 +6,7 @@
 //! in f64. Checked against the closed form of a homogeneous ball and against pictures of another renderer.
 
 use super::along::{self, Marching, Position};
-use super::density;
+use super::density::Field;
 use super::environment::Sky;
 use super::rays::{Scratch, trace};
 use super::sequence::DIMENSIONS;
@@ -23,6 +23,7 @@ const LEAST_DISTANCE: f64 = 1e-3;
 pub struct Integrator<'a> {
     accel: &'a Accel,
     medium: &'a Medium,
+    field: Field<'a>,
     lights: &'a [Light],
     sky: Option<Sky>,
     frame: RayFrame,
@@ -49,6 +50,7 @@ impl<'a> Integrator<'a> {
         Ok(Self {
             accel,
             medium,
+            field: Field::new(medium.density_field()),
             lights: &scene.lights,
             sky: scene.environment.as_ref().and_then(Sky::new),
             frame: scene.ray_frame()?,
@@ -66,7 +68,14 @@ impl<'a> Integrator<'a> {
     pub fn hits(&self, x: f64, y: f64, worker: &mut Worker) -> bool {
         let direction = self.frame.direction(x, y, self.size[0], self.size[1]);
         worker.rays += 1;
-        trace(self.accel, 1.0, self.frame.origin, direction, f64::INFINITY, &mut worker.view);
+        trace(
+            self.accel,
+            1.0,
+            self.frame.origin,
+            direction,
+            f64::INFINITY,
+            &mut worker.view,
+        );
         !worker.view.stretches.is_empty()
     }
 
@@ -76,7 +85,14 @@ impl<'a> Integrator<'a> {
         let origin = self.frame.origin;
         let direction = self.frame.direction(x, y, self.size[0], self.size[1]);
         worker.rays += 1;
-        trace(self.accel, self.medium.ior(), origin, direction, f64::INFINITY, &mut worker.view);
+        trace(
+            self.accel,
+            self.medium.ior(),
+            origin,
+            direction,
+            f64::INFINITY,
+            &mut worker.view,
+        );
         if worker.view.stretches.is_empty() {
             return DVec3::ZERO;
         }
@@ -85,9 +101,24 @@ impl<'a> Integrator<'a> {
             let rho = self.medium.uniform_density();
             along::in_homogeneous(kappa, rho, &worker.view.stretches, p[2])
         } else {
-            along::in_field(self.medium, origin, direction, &worker.view, &mut worker.march, p[2])
+            along::in_field(
+                (kappa, &self.field),
+                origin,
+                direction,
+                &worker.view,
+                &mut worker.march,
+                p[2],
+            )
         };
-        let Some(Position { t, density, view, boundary }) = found else { return DVec3::ZERO };
+        let Some(Position {
+            t,
+            density,
+            view,
+            boundary,
+        }) = found
+        else {
+            return DVec3::ZERO;
+        };
         let at = origin + direction * t;
         let scattering = kappa * self.medium.albedo() * self.medium.density_and_scattering(at).1;
         if scattering == DVec3::ZERO {
@@ -119,14 +150,24 @@ impl<'a> Integrator<'a> {
             return DVec3::ZERO;
         }
         worker.rays += 1;
-        trace(self.accel, self.medium.ior(), at, towards, distance, &mut worker.shadow);
-        let field = self.medium.density_field();
+        trace(
+            self.accel,
+            self.medium.ior(),
+            at,
+            towards,
+            distance,
+            &mut worker.shadow,
+        );
         let mut depth = 0.0;
         for s in &worker.shadow.stretches {
             let memory = (&mut worker.march.cuts, &mut worker.march.crossings);
-            depth += density::length(field, at, towards, s.start, s.end, memory);
+            depth += self.field.length(at, towards, s.start, s.end, memory);
         }
-        let boundary = worker.shadow.stretches.last().map_or(1.0, |s| s.reached * s.leaving);
+        let boundary = worker
+            .shadow
+            .stretches
+            .last()
+            .map_or(1.0, |s| s.reached * s.leaving);
         // Light travels along -towards, the camera lies along -view.
         let phase = self.medium.phase().value(towards.dot(view));
         irradiance * (-self.medium.extinction() * depth).exp() * (phase * boundary)
