@@ -14,6 +14,7 @@
 mod bindings;
 mod device;
 mod headless;
+mod neighbours;
 mod passes;
 mod renderer;
 mod scene;

@@ -1,6 +1,7 @@
 //! Buffers of an asset, and of a frame's rays and lights.
 
 use super::bindings::{Slot, empty_buffer, filled_buffer, group, layout};
+use super::neighbours::neighbours;
 use super::uniforms::{LightRecord, MediumUniform, ViewUniform};
 use crate::cpu::surface::corner_normals;
 use crate::exact::ExactDepths;
@@ -16,6 +17,7 @@ pub(super) struct AssetBuffers {
     pub medium: Buffer,
     pub positions: Buffer,
     pub triangles: Buffer,
+    pub neighbours: Buffer,
     pub normals: Buffer,
     pub samples: Buffer,
     pub weights: Buffer,
@@ -83,6 +85,7 @@ impl AssetBuffers {
         Ok(Self {
             positions: filled_buffer(device, "positions", &asset.mesh_positions, storage),
             triangles: filled_buffer(device, "triangles", &asset.mesh_triangles, storage),
+            neighbours: filled_buffer(device, "neighbours", &neighbours(&asset.mesh_triangles), storage),
             normals: filled_buffer(device, "normals", normals.as_flattened(), storage),
             samples: filled_buffer(device, "samples", &kernels, storage),
             weights: filled_buffer(device, "weights", &samples.weight, storage),

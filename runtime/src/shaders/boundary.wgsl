@@ -3,17 +3,17 @@
 // Concatenated after surface.wgsl. The highlight is the twin of `cpu::surface::highlight`.
 const BOUNDARY: u32 = 12u; // eight reflectances, highlight (rgb), unused
 
-@group(1) @binding(3) var<storage, read> normals: array<f32>;
-@group(1) @binding(4) var<storage, read> lights: array<Light>;
-@group(1) @binding(5) var<storage, read_write> boundary: array<f32>;
+@group(1) @binding(4) var<storage, read> normals: array<f32>;
+@group(1) @binding(5) var<storage, read> lights: array<Light>;
+@group(1) @binding(6) var<storage, read_write> boundary: array<f32>;
 
 @fragment
 fn reflect_at(in: Corner, @builtin(front_facing) entry: bool) {
     let pixel = vec2u(in.position.xy);
     let index = pixel_index(pixel);
     let direction = ray_direction(pixel);
-    let t = distance_to(in, direction);
-    let own = crossing_key(t, entry);
+    let meeting = meet(in.triangle, entry, direction);
+    let own = crossing_key(meeting.t, entry);
     // Two programs may round the same distance differently: take the nearest key of the same kind.
     var best = SLOTS;
     var least = 64u;
@@ -28,12 +28,11 @@ fn reflect_at(in: Corner, @builtin(front_facing) entry: bool) {
     if (best == SLOTS) {
         return;
     }
-    let area = cross(in.b - in.a, in.c - in.a);
-    let geometric = area / max(length(area), 1e-30);
+    let geometric = meeting.area / max(length(meeting.area), 1e-30);
     boundary[index * BOUNDARY + best] = 1.0 - fresnel_transmittance(dot(direction, geometric), medium.ior);
     let outside = bitcast<i32>(atomicLoad(&crossings[index * STATE + SLOTS])) <= 0;
     if (best == 0u && entry && outside && view.specular > 0.0) {
-        let colour = highlight(in, area, geometric, t, direction);
+        let colour = highlight(meeting, geometric, direction);
         boundary[index * BOUNDARY + 8u] = colour.x;
         boundary[index * BOUNDARY + 9u] = colour.y;
         boundary[index * BOUNDARY + 10u] = colour.z;
@@ -44,19 +43,21 @@ fn corner_normal(corner: u32) -> vec3f {
     return vec3f(normals[3u * corner], normals[3u * corner + 1u], normals[3u * corner + 2u]);
 }
 
-fn highlight(in: Corner, area: vec3f, geometric: vec3f, t: f32, direction: vec3f) -> vec3f {
+fn highlight(meeting: Meeting, geometric: vec3f, direction: vec3f) -> vec3f {
     let towards_camera = -direction;
-    let q = direction * t; // the entry as seen from the camera, as the corners are
-    let inverse = 1.0 / max(dot(area, area), 1e-37);
-    let u = dot(cross(in.c - in.b, q - in.b), area) * inverse;
-    let v = dot(cross(in.a - in.c, q - in.c), area) * inverse;
-    let first = 3u * in.triangle;
+    let point = view.origin + direction * meeting.t;
+    let first = 3u * meeting.triangle;
+    let a = corner_position(first);
+    let b = corner_position(first + 1u);
+    let c = corner_position(first + 2u);
+    let inverse = 1.0 / max(dot(meeting.area, meeting.area), 1e-37);
+    let u = dot(cross(c - b, point - b), meeting.area) * inverse;
+    let v = dot(cross(a - c, point - c), meeting.area) * inverse;
     let smooth_sum = corner_normal(first) * u + corner_normal(first + 1u) * v + corner_normal(first + 2u) * (1.0 - u - v);
     var n = smooth_sum / max(length(smooth_sum), 1e-30);
     if (!(dot(n, towards_camera) > 0.0)) {
         n = geometric;
     }
-    let point = view.origin + q;
     var sum = vec3f(0.0);
     for (var l = 0u; l < view.scene_lights; l++) {
         let arriving = incident(lights[l], point);

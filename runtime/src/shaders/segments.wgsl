@@ -74,7 +74,7 @@ fn segments(@builtin(global_invocation_id) pixel: vec3u) {
             atomicMax(&arguments[k * ARGUMENTS + 4u], groups.x);
             atomicMax(&arguments[k * ARGUMENTS + 5u], groups.y);
             atomicMax(&arguments[k * ARGUMENTS + 6u], 1u);
-            atomicMax(&arguments[k * ARGUMENTS], 4u);
+            atomicMax(&arguments[k * ARGUMENTS], 6u);
         }
     }
     front[index] = vec4f(1.0, 1.0, 1.0, 0.0);

@@ -19,45 +19,45 @@ struct Sums {
     @location(1) denominator: vec4f, // w * W per channel
 }
 
-// Slopes of the two lines through the camera that touch a circle at (across, depth) with squared radius r2.
-fn tangents(across: f32, depth: f32, r2: f32) -> vec2f {
-    let spread = sqrt(r2 * max(across * across + depth * depth - r2, 0.0));
-    let middle = across * depth;
-    return vec2f(middle - spread, middle + spread) / (depth * depth - r2);
-}
+// Corners of a hexagon around the unit circle, in the order of a triangle strip.
+const HEXAGON = array<vec2f, 6>(
+    vec2f(1.1547005, 0.0), vec2f(0.57735027, 1.0), vec2f(0.57735027, -1.0),
+    vec2f(-0.57735027, 1.0), vec2f(-0.57735027, -1.0), vec2f(-1.1547005, 0.0));
 
-// A rectangle of the picture around the kernel's sphere: low and high corner in coordinates along right and up at
-// distance 1. Empty when the sphere is behind the camera, everything when it reaches the camera's plane.
-fn bounds(centre: vec3f, radius: f32) -> vec4f {
-    let depth = dot(centre, view.forward);
-    if (depth <= -radius) {
-        return vec4f(1.0, 1.0, -1.0, -1.0);
+// A corner of a hexagon around the kernel's sphere as the camera sees it, in coordinates along right and up.
+//
+// A sphere with radius r at distance z along the view and p across it projects to an ellipse whose axes point away
+// from the picture's centre and across: with w = z * z - r * r, middle p z / w, semi-axes r sqrt(p * p + w) / w and
+// r / sqrt(w). A sphere that reaches the camera's plane may be anywhere in the picture.
+fn corner_around(centre: vec3f, radius: f32, corner: u32) -> vec2f {
+    let unit = vec2f(length(view.right), length(view.up)); // of right and up, at distance 1
+    let z = dot(centre, view.forward);
+    if (z < 1.05 * radius) {
+        return 4.0 * HEXAGON[corner];
     }
-    if (depth < 1.01 * radius) {
-        return vec4f(-1.0, -1.0, 1.0, 1.0) * 2.0;
+    let across = vec2f(dot(centre, view.right), dot(centre, view.up)) / unit;
+    let p = length(across);
+    var away = vec2f(1.0, 0.0);
+    if (p > 0.0) {
+        away = across / p;
     }
-    let r2 = radius * radius;
-    let wide = length(view.right);
-    let high = length(view.up);
-    let x = tangents(dot(centre, view.right) / wide, depth, r2) / wide;
-    let y = tangents(dot(centre, view.up) / high, depth, r2) / high;
-    return vec4f(x.x, y.x, x.y, y.y);
+    // An eighth of a pixel for the rounding of coordinates.
+    let margin = 0.25 * max(unit.x / f32(view.width), unit.y / f32(view.height));
+    let w = z * z - radius * radius;
+    let axes = vec2f(radius * sqrt(p * p + w) / w, radius / sqrt(w)) + margin;
+    let at = vec2f(p * z / w, 0.0) + axes * HEXAGON[corner];
+    return (away * at.x + vec2f(-away.y, away.x) * at.y) / unit;
 }
 
 @vertex
-fn quad(@builtin(vertex_index) corner: u32, @builtin(instance_index) index: u32) -> Splat {
+fn outline(@builtin(vertex_index) corner: u32, @builtin(instance_index) index: u32) -> Splat {
     let sample = samples[index];
     let source = sources[index];
     let centre = sample.xyz - view.origin;
-    var box = bounds(centre, 1.0001 * CUT_OFF_RADIUS / sample.w);
-    // Within three picture sizes, so that rasterisers keep their precision; a sixteenth of a pixel for rounding.
-    let margin = 0.125 / vec2f(f32(view.width), f32(view.height));
-    let empty = box.x > box.z;
-    box = clamp(box, vec4f(-3.0), vec4f(3.0)) + vec4f(-margin, margin);
-    let plane = select(box.xy, box.zw, vec2<bool>((corner & 1u) == 1u, (corner & 2u) == 2u));
-    var position = tile_clip(plane, 1.0);
-    if (source.w <= 0.0 || empty) {
-        position = vec4f(2.0, 2.0, 0.0, 1.0);
+    let radius = 1.0001 * CUT_OFF_RADIUS / sample.w;
+    var position = vec4f(2.0, 2.0, 0.0, 1.0);
+    if (source.w > 0.0 && dot(centre, view.forward) > -radius) {
+        position = tile_clip(corner_around(centre, radius, corner), 1.0);
     }
     position.z = 0.0;
     return Splat(position, vec4f(centre, sample.w), source);
@@ -85,27 +85,21 @@ fn add(in: Splat) -> Sums {
     if (ends.x >= ends.y) {
         discard;
     }
-    var before = ends.x - whole.x;
-    var kappa = medium.kappa;
-    var scattering = 1.0;
+    var path = Path(ends.x - tc, ends.y - ends.x, ends.x - whole.x, 1.0, 1.0);
     if (HETEROGENEOUS) {
         // Attenuation in front from the profile; inside the support it is taken as linear.
         let first = profile_at(index, ends.x - whole.x, whole.y - whole.x);
         let last = profile_at(index, ends.y - whole.x, whole.y - whole.x);
-        let slope = (last - first) * (1.0 / (ends.y - ends.x));
-        before = first.x;
-        kappa *= slope.x;
-        scattering = slope.y;
+        let slope = (last - first) * (1.0 / path.length);
+        path.before = first.x;
+        path.density = slope.x;
+        path.scattering = slope.y;
     }
-    var w: vec3f;
-    let decay = -medium.kappa * before;
-    if (GREY) {
-        w = vec3f(scattering * exp(decay.x) * kernel_integral(a, d2, tc, kappa.x, ends.x, ends.y));
-    } else {
-        w = scattering * exp(decay) * vec3f(
-            kernel_integral(a, d2, tc, kappa.x, ends.x, ends.y),
-            kernel_integral(a, d2, tc, kappa.y, ends.x, ends.y),
-            kernel_integral(a, d2, tc, kappa.z, ends.x, ends.y));
+    let long = a * (whole.y - whole.x) >= LEAST_WIDTHS;
+    var w = vec3f(kernel_weight(a, d2, path, medium.kappa.x, long));
+    if (!GREY) {
+        w.y = kernel_weight(a, d2, path, medium.kappa.y, long);
+        w.z = kernel_weight(a, d2, path, medium.kappa.z, long);
     }
     w *= in.source.w;
     return Sums(vec4f(in.source.xyz * w, 1.0), vec4f(w, 0.0));

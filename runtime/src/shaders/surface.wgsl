@@ -6,50 +6,103 @@
 const SLOTS: u32 = 8u;
 const STATE: u32 = 10u; // slots, sum of signs (+1 exit, -1 entry), number of crossings
 
+// The rasteriser decides which triangles a ray meets, so that a closed mesh has no gaps, but it rounds positions to a
+// fraction of a pixel. Where a ray runs past a triangle by less than that, `meet` looks for the neighbour that it
+// really meets. Distances are measured from a point of the ray next to the triangle, with the rounding of large
+// coordinates carried along.
+
 @group(1) @binding(0) var<storage, read> positions: array<f32>;
 @group(1) @binding(1) var<storage, read> triangles: array<u32>;
 @group(1) @binding(2) var<storage, read_write> crossings: array<atomic<u32>>;
+@group(1) @binding(3) var<storage, read> neighbours: array<u32>; // across the edges 0-1, 1-2, 2-0
 
 struct Corner {
     @invariant @builtin(position) position: vec4f,
-    // The triangle's corners as seen from the camera.
-    @location(0) @interpolate(flat) a: vec3f,
-    @location(1) @interpolate(flat) b: vec3f,
-    @location(2) @interpolate(flat) c: vec3f,
-    @location(3) @interpolate(flat) triangle: u32,
+    @location(0) @interpolate(flat) triangle: u32,
 }
 
 fn corner_position(corner: u32) -> vec3f {
     let v = 3u * triangles[corner];
-    return vec3f(positions[v], positions[v + 1u], positions[v + 2u]) - view.origin;
+    return vec3f(positions[v], positions[v + 1u], positions[v + 2u]);
 }
 
 @vertex
 fn corner(@builtin(vertex_index) index: u32) -> Corner {
-    let triangle = index / 3u;
-    let q = corner_position(index);
+    let q = corner_position(index) - view.origin;
     let plane = vec2f(
         dot(q, view.right) / dot(view.right, view.right),
         dot(q, view.up) / dot(view.up, view.up));
-    return Corner(
-        tile_clip(plane, dot(q, view.forward)),
-        corner_position(3u * triangle), corner_position(3u * triangle + 1u), corner_position(3u * triangle + 2u),
-        triangle);
+    return Corner(tile_clip(plane, dot(q, view.forward)), index / 3u);
 }
 
-// Where the ray meets the triangle's plane, within the range of the triangle itself.
-fn distance_to(in: Corner, direction: vec3f) -> f32 {
-    let n = cross(in.b - in.a, in.c - in.a);
-    let at = vec3f(dot(in.a, direction), dot(in.b, direction), dot(in.c, direction));
-    let low = min(at.x, min(at.y, at.z));
-    let high = max(at.x, max(at.y, at.z));
-    let slope = dot(n, direction);
-    var t = 0.5 * (low + high);
-    if (slope != 0.0) {
-        // From the foot of the first corner: the difference is small where the triangle is.
-        t = at.x + dot(n, in.a - direction * at.x) / slope;
+// x without its lower 12 bits: products of two such numbers are exact.
+fn coarse(x: f32) -> f32 {
+    return bitcast<f32>(bitcast<u32>(x) & 0xfffff000u);
+}
+
+// p - origin - direction * t for a coarse t, with hardly any rounding (Knuth's difference and Dekker's product).
+fn from_ray(p: vec3f, direction: vec3f, t: f32) -> vec3f {
+    let d = p - view.origin;
+    let back = p - d;
+    let lost = (p - (d + back)) + (back - view.origin);
+    let high = vec3f(coarse(direction.x), coarse(direction.y), coarse(direction.z));
+    return ((d - high * t) - (direction - high) * t) + lost;
+}
+
+struct Meeting {
+    triangle: u32,
+    t: f32,
+    area: vec3f,    // outward normal times twice the area
+}
+
+// Where the ray meets the surface at or next to `first`, which the rasteriser named.
+fn meet(first: u32, entry: bool, direction: vec3f) -> Meeting {
+    var named = Meeting(first, 0.0, vec3f(0.0));
+    var triangle = first;
+    for (var step = 0u; step < 4u; step++) {
+        let a = corner_position(3u * triangle);
+        let b = corner_position(3u * triangle + 1u);
+        let c = corner_position(3u * triangle + 2u);
+        let area = cross(b - a, c - a);
+        let slope = dot(area, direction);
+        let near = coarse(dot(a - view.origin, direction));
+        let qa = from_ray(a, direction, near);
+        let qb = from_ray(b, direction, near);
+        let qc = from_ray(c, direction, near);
+        var t = near;
+        if (slope != 0.0) {
+            t += dot(area, qa) / slope;
+        }
+        if (step == 0u) {
+            let at = vec3f(dot(qa, direction), dot(qb, direction), dot(qc, direction)) + near;
+            let low = min(at.x, min(at.y, at.z));
+            named = Meeting(first, max(clamp(t, low, max(at.x, max(at.y, at.z))), 1e-30), area);
+        } else if (t <= 0.0) {
+            break;
+        }
+        // Edge functions are not negative where the ray is inside; they add up to |slope|.
+        let side = select(1.0, -1.0, entry);
+        if (slope * side <= 0.0) {
+            break;
+        }
+        let edges = side * vec3f(
+            dot(direction, cross(qa, qb)), dot(direction, cross(qb, qc)), dot(direction, cross(qc, qa)));
+        var across = 0u;
+        var least = edges.x;
+        if (edges.y < least) {
+            across = 1u;
+            least = edges.y;
+        }
+        if (edges.z < least) {
+            across = 2u;
+            least = edges.z;
+        }
+        if (least >= 0.0) {
+            return Meeting(triangle, max(t, 1e-30), area);
+        }
+        triangle = neighbours[3u * triangle + across];
     }
-    return max(clamp(t, low, high), 1e-30);
+    return named;
 }
 
 fn crossing_key(t: f32, entry: bool) -> u32 {
@@ -60,7 +113,7 @@ fn crossing_key(t: f32, entry: bool) -> u32 {
 fn insert(in: Corner, @builtin(front_facing) entry: bool) {
     let pixel = vec2u(in.position.xy);
     let state = pixel_index(pixel) * STATE;
-    var key = crossing_key(distance_to(in, ray_direction(pixel)), entry);
+    var key = crossing_key(meet(in.triangle, entry, ray_direction(pixel)).t, entry);
     for (var slot = 0u; slot < SLOTS && key != 0u; slot++) {
         key = min(key, atomicMax(&crossings[state + slot], key));
     }

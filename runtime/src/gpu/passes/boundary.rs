@@ -18,7 +18,7 @@ pub(crate) struct Boundary {
 impl Boundary {
     pub fn new(device: &Device, common: &BindGroupLayout) -> Self {
         use Slot::{Read, Write};
-        let slots = [Read, Read, Write, Read, Read, Write];
+        let slots = [Read, Read, Write, Read, Read, Read, Write];
         let layout = layout(device, "boundary", ShaderStages::VERTEX_FRAGMENT, &slots);
         let pipeline_layout = pipeline_layout(device, "boundary", common, &layout);
         let module = shaders::module(device, "boundary", shaders::BOUNDARY);
@@ -37,6 +37,7 @@ impl Boundary {
             &asset.positions,
             &asset.triangles,
             &targets.crossings,
+            &asset.neighbours,
             &asset.normals,
             &frame.lights,
             &targets.boundary,

@@ -47,7 +47,7 @@ impl Splat {
             layout: Some(&pipeline_layout),
             vertex: VertexState {
                 module: &module,
-                entry_point: Some("quad"),
+                entry_point: Some("outline"),
                 compilation_options: options(&constants),
                 buffers: &[],
             },

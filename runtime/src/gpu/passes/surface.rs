@@ -25,7 +25,7 @@ impl Surface {
             device,
             "surface",
             ShaderStages::VERTEX_FRAGMENT,
-            &[Slot::Read, Slot::Read, Slot::Write],
+            &[Slot::Read, Slot::Read, Slot::Write, Slot::Read],
         );
         let pipeline_layout = pipeline_layout(device, "surface", common, &layout);
         let module = shaders::module(device, "surface", shaders::SURFACE);
@@ -34,7 +34,12 @@ impl Surface {
     }
 
     pub fn bind(&self, device: &Device, asset: &AssetBuffers, targets: &Targets) -> BindGroup {
-        let resources = [&asset.positions, &asset.triangles, &targets.crossings];
+        let resources = [
+            &asset.positions,
+            &asset.triangles,
+            &targets.crossings,
+            &asset.neighbours,
+        ];
         group(
             device,
             "surface",

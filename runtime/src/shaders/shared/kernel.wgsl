@@ -1,4 +1,5 @@
-// The samples' kernel integrated along a ray. Twin of formats/src/kernel.rs, which states the formulas.
+// The samples' kernel integrated along a ray. Twin of formats/src/kernel.rs and formats/src/hits.rs, which state the
+// formulas.
 const CUT_OFF: f32 = 5.0;
 const CUT_OFF_VALUE: f32 = 0.006737947;
 const CUT_OFF_RADIUS: f32 = 2.236068;
@@ -38,11 +39,10 @@ fn short_node(s: f32, ad2: f32, u0: f32, a: f32, kappa: f32) -> f32 {
     return exp(-kappa * s) * max(exp(-ad2 - u * u) - CUT_OFF_VALUE, 0.0);
 }
 
-// Integral over t in start..end (inside the support) of e^(-kappa (t-start)) kernel(t).
-fn kernel_integral(a: f32, d2: f32, tc: f32, kappa: f32, start: f32, end: f32) -> f32 {
-    let length = end - start;
-    let u0 = a * (start - tc);
-    let u1 = a * (end - tc);
+// Integral over `length` from `s` behind the closest approach, inside the support, of e^(-kappa along) kernel.
+fn kernel_integral(a: f32, d2: f32, s: f32, length: f32, kappa: f32) -> f32 {
+    let u0 = a * s;
+    let u1 = a * (s + length);
     let ad2 = a * a * d2;
     if (a * length < 0.5 && kappa * length < 0.5) {
         return short_integral(ad2, u0, a, kappa, length);
@@ -62,4 +62,54 @@ fn kernel_integral(a: f32, d2: f32, tc: f32, kappa: f32, start: f32, end: f32) -
     }
     let cut = CUT_OFF_VALUE * length * decay_mean(kappa * length);
     return max(HALF_ROOT_PI / a * sum - cut, 0.0);
+}
+
+// erf x, absolute error below 5e-7.
+fn error_function(value: f32) -> f32 {
+    let x = clamp(value, -3.95, 3.95);
+    let s = x * x;
+    var p = 3.917343e-3 + s * (2.8760142e-4 + s * 2.0117403e-6);
+    p = 1.128379 + s * (0.19403625 + s * (0.053207136 + s * p));
+    var q = 1.5270751e-2 + s * (1.1982075e-3 + s * 3.783973e-5);
+    q = 1.0 + s * (0.50529164 + s * (0.11559099 + s * q));
+    return x * p / q;
+}
+
+// The same as kernel_integral * e^-before in fewer steps, for kappa <= a and pieces that are not tiny.
+fn mild_integral(a: f32, d2: f32, s: f32, length: f32, kappa: f32, before: f32) -> f32 {
+    let inverse = 1.0 / a;
+    let half = 0.5 * kappa * inverse;
+    let u0 = a * s;
+    let x0 = u0 + half;
+    let x1 = x0 + a * length;
+    let scale = exp(half * (half + 2.0 * u0) - a * a * d2 - before);
+    let y = kappa * length;
+    let series = 1.0 - y * (0.5 - y * (1.0 / 6.0 - y * (1.0 / 24.0 - y * (1.0 / 120.0))));
+    let mean = select((1.0 - exp(-y)) / max(y, 0.1), series, y < 0.2);
+    let cut = CUT_OFF_VALUE * length * mean * exp(-before);
+    return max(HALF_ROOT_PI * inverse * scale * (error_function(x1) - error_function(x0)) - cut, 0.0);
+}
+
+// A kernel's support along a ray, inside a piece.
+struct Path {
+    s: f32,             // its start, from the closest approach to the centre
+    length: f32,
+    before: f32,        // depth between the piece's start and the support's, at unit extinction
+    density: f32,       // mean over the support
+    scattering: f32,    // the same of the scattering part
+}
+
+// Pieces shorter than this many kernel widths 1/a take the general form.
+const LEAST_WIDTHS: f32 = 0.1;
+
+// Weight of a kernel without its own factor w, for the extinction `kappa` of one channel.
+fn kernel_weight(a: f32, d2: f32, path: Path, kappa: f32, long: bool) -> f32 {
+    let here = kappa * path.density;
+    var weight = 0.0;
+    if (long && here <= a) {
+        weight = mild_integral(a, d2, path.s, path.length, here, kappa * path.before);
+    } else {
+        weight = exp(-kappa * path.before) * kernel_integral(a, d2, path.s, path.length, here);
+    }
+    return weight * path.scattering;
 }
