@@ -1,9 +1,10 @@
 //! One renderer, whichever backend draws: what the command line, the window and the validation call.
 
-use crate::Result;
+use crate::{Error, Result};
 use crate::cpu::CpuRenderer;
 use crate::exact::{DepthTracer, ExactDepths};
 use crate::frame::Frame;
+use crate::gpu::GpuRenderer;
 use crate::rendered::Rendered;
 use diaphane_formats::asset::{Asset, Info};
 use std::time::Instant;
@@ -35,6 +36,7 @@ pub enum LightMode {
 /// The backend at work.
 enum Engine {
     Cpu(Box<CpuRenderer>),
+    Gpu(Box<GpuRenderer>),
 }
 
 /// Plays one asset.
@@ -67,6 +69,7 @@ impl Player {
     pub fn describe(&self) -> (&'static str, String) {
         match &self.engine {
             Engine::Cpu(_) => ("cpu", format!("{} threads", rayon::current_num_threads())),
+            Engine::Gpu(gpu) => ("gpu", gpu.adapter().to_owned()),
         }
     }
 
@@ -98,6 +101,7 @@ impl Player {
         let exact_ms = started.elapsed().as_secs_f64() * 1e3;
         let mut rendered = match &mut self.engine {
             Engine::Cpu(cpu) => cpu.render(frame, exact.as_ref()),
+            Engine::Gpu(gpu) => gpu.render(frame, exact.as_ref())?,
         };
         if exact.is_some() {
             rendered.passes.insert(0, ("exact depths", exact_ms));
@@ -126,12 +130,16 @@ impl Player {
 }
 
 fn open(asset: &Asset, backend: Backend) -> Result<(Engine, Option<String>)> {
+    let cpu = || -> Result<Engine> { Ok(Engine::Cpu(Box::new(CpuRenderer::new(asset)?))) };
+    let gpu = || -> Result<Engine> { Ok(Engine::Gpu(Box::new(GpuRenderer::new(asset)?))) };
     match backend {
-        Backend::Cpu => Ok((Engine::Cpu(Box::new(CpuRenderer::new(asset)?)), None)),
-        Backend::Gpu => Err(crate::Error::NoAdapter("this build has no GPU renderer".to_owned())),
-        Backend::Auto => {
-            let note = "this build has no GPU renderer; drawing on the CPU".to_owned();
-            Ok((Engine::Cpu(Box::new(CpuRenderer::new(asset)?)), Some(note)))
-        }
+        Backend::Cpu => Ok((cpu()?, None)),
+        Backend::Gpu => Ok((gpu()?, None)),
+        Backend::Auto => match gpu() {
+            Ok(engine) => Ok((engine, None)),
+            Err(Error::NoAdapter(why)) => Ok((cpu()?, Some(format!("no usable GPU ({why}); drawing on the CPU")))),
+            Err(Error::Gpu(why)) => Ok((cpu()?, Some(format!("the GPU failed ({why}); drawing on the CPU")))),
+            Err(other) => Err(other),
+        },
     }
 }
