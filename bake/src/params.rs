@@ -11,6 +11,8 @@ pub struct Params {
     pub samples: usize,
     /// Directions in which the optical depth of each sample is computed.
     pub directions: usize,
+    /// Points around each sample over which its transmittance is averaged.
+    pub points_per_sample: usize,
     /// Bands of spherical harmonics, 1..=10.
     pub order: usize,
     /// Seed of all random choices.
@@ -50,12 +52,20 @@ pub enum Preset {
 impl Params {
     /// The parameters of a preset.
     pub fn preset(preset: Preset) -> Self {
-        let (samples, directions, order) = match preset {
-            Preset::Draft => (5_000, 96, 5),
-            Preset::Standard => (50_000, 256, 7),
-            Preset::Fine => (50_000, 512, 9),
+        let (samples, directions, points_per_sample, order) = match preset {
+            Preset::Draft => (5_000, 96, 4, 5),
+            Preset::Standard => (50_000, 256, 8, 7),
+            Preset::Fine => (50_000, 512, 16, 9),
         };
-        Self { samples, directions, order, seed: 1, encoding: Encoding::RECIPROCAL, width_factor: 1.4 }
+        Self {
+            samples,
+            directions,
+            points_per_sample,
+            order,
+            seed: 1,
+            encoding: Encoding::RECIPROCAL,
+            width_factor: 1.4,
+        }
     }
 
     pub(crate) fn validate(&self) -> Result<()> {
@@ -65,6 +75,9 @@ impl Params {
         }
         if !(1..=65_536).contains(&self.directions) {
             return fail(format!("--directions must lie within 1..65536, not {}", self.directions));
+        }
+        if !(1..=256).contains(&self.points_per_sample) {
+            return fail(format!("the points for each sample must lie within 1..256, not {}", self.points_per_sample));
         }
         if !(1..=MAX_ORDER).contains(&self.order) {
             return fail(format!("--sh-order must lie within 1..{MAX_ORDER}, not {}", self.order));

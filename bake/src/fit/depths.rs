@@ -1,23 +1,26 @@
 //! Optical depth of every sample in every direction, by projecting the mesh along each.
 
+use super::cells;
 use crate::field::Shape;
 use crate::params::{DARK, Params};
 use crate::progress::Stage;
 use crate::samples::{Candidate, Placed};
 use crate::{Error, Prepared, Result};
 use diaphane_formats::directions::{even_directions, hash};
-use diaphane_formats::visibility::project_with;
+use diaphane_formats::visibility::{DepthRows, project_with};
 use glam::DVec3;
 use rayon::prelude::*;
 
-/// Samples that receive light, with their depths.
+/// Samples that receive light, with their transmittance.
 pub(crate) struct Lit {
     pub samples: Vec<Candidate>,
+    /// Where the values below hold: the mean of the points that each sample stands for.
+    pub centroids: Vec<DVec3>,
     pub probes: Vec<Candidate>,
     pub directions: Vec<DVec3>,
-    /// m in row-major [sample][direction] order.
-    pub density_length: Vec<f32>,
-    /// Fresnel transmittance products in the same order; empty when index matched.
+    /// ψ at the reference extinction, mean over each sample's points, row-major [sample][direction].
+    pub transmittance: Vec<f32>,
+    /// Fresnel transmittance products in the same order, weighted by ψ; empty when index matched.
     pub boundary: Vec<f32>,
     /// Samples dropped because they turned out dark or outside.
     pub discarded: usize,
@@ -27,7 +30,7 @@ pub(crate) struct Lit {
 }
 
 /// Directions projected before their rows are turned into columns: bounds the memory of the rows.
-const GROUP: usize = 32;
+const GROUP: usize = 16;
 
 pub(crate) fn depths(
     shape: &Shape<'_>,
@@ -37,15 +40,17 @@ pub(crate) fn depths(
     stage: Stage<'_>,
 ) -> Result<Lit> {
     let directions = even_directions(params.directions, hash(params.seed, 31));
-    let points: Vec<DVec3> = placed.samples.iter().map(|s| s.position).collect();
-    let (n, d) = (points.len(), directions.len());
+    let per_sample = params.points_per_sample;
+    let points = cells::points(shape, &placed.samples, per_sample, hash(params.seed, 37))?;
+    let (n, d) = (placed.samples.len(), directions.len());
     stage.expect(d.div_ceil(2));
     let matched = medium.medium.ior() == 1.0;
-    let mut density_length = vec![0.0f32; n * d];
+    let kappa = medium.medium.reference_extinction() as f32;
+    let mut transmittance = vec![0.0f32; n * d];
     let mut boundary = vec![1.0f32; if matched { 0 } else { n * d }];
     let mut outside_votes = vec![0u32; n];
     for (g, group) in directions.chunks(GROUP).enumerate() {
-        let rows: Vec<_> = group
+        let rows: Vec<DepthRows> = group
             .par_chunks(2)
             .map(|pair| {
                 let rows = project_with(shape.mesh, medium.medium, medium.for_rays(), &points, pair[0]);
@@ -53,38 +58,44 @@ pub(crate) fn depths(
                 Ok(rows)
             })
             .collect::<Result<_>>()?;
-        let column = |k: usize| (k / 2, k % 2);
-        density_length.par_chunks_mut(d).enumerate().for_each(|(i, out)| {
+        let column = |k: usize| (&rows[k / 2], k % 2);
+        transmittance.par_chunks_mut(d).zip(&mut outside_votes).enumerate().for_each(|(i, (out, votes))| {
+            let own = i * per_sample..(i + 1) * per_sample;
             for k in 0..group.len() {
                 let (row, side) = column(k);
-                let row = &rows[row];
-                out[g * GROUP + k] = if side == 0 { row.forward[i] } else { row.backward[i] };
+                let lengths = if side == 0 { &row.forward } else { &row.backward };
+                let sum: f32 = lengths[own.clone()].iter().map(|m| (-kappa * m).exp()).sum();
+                out[g * GROUP + k] = sum / per_sample as f32;
+                *votes += row.winding[side][own.clone()].iter().filter(|w| **w <= 0).count() as u32;
             }
         });
         if !matched {
             boundary.par_chunks_mut(d).enumerate().for_each(|(i, out)| {
+                let own = i * per_sample..(i + 1) * per_sample;
                 for k in 0..group.len() {
                     let (row, side) = column(k);
-                    out[g * GROUP + k] = rows[row].boundary[side][i];
+                    let lengths = if side == 0 { &row.forward } else { &row.backward };
+                    let (mut through, mut all) = (0.0f32, 0.0f32);
+                    for q in own.clone() {
+                        // A little more than ψ, so that darkness divides no zero by zero.
+                        let psi = (-kappa * lengths[q]).exp() + 1e-6;
+                        through += psi * row.boundary[side][q];
+                        all += psi;
+                    }
+                    out[g * GROUP + k] = through / all;
                 }
             });
         }
-        outside_votes.par_iter_mut().enumerate().for_each(|(i, votes)| {
-            for k in 0..group.len() {
-                let (row, side) = column(k);
-                *votes += u32::from(rows[row].winding[side][i] <= 0);
-            }
-        });
     }
-    let kappa = medium.medium.reference_extinction() as f32;
     let keep: Vec<bool> = (0..n)
         .into_par_iter()
         .map(|i| {
-            let depth = &density_length[i * d..(i + 1) * d];
+            let psi = &transmittance[i * d..(i + 1) * d];
             let through = |k: usize| boundary.get(i * d + k).copied().unwrap_or(1.0);
-            let light: f32 = depth.iter().enumerate().map(|(k, m)| (-kappa * m).exp() * through(k)).sum();
+            let light: f32 = psi.iter().enumerate().map(|(k, psi)| psi * through(k)).sum();
             // The layers' estimate decided before; only what is clearly darker goes now.
-            f64::from(light) / d as f64 >= 0.2 * DARK && 2 * outside_votes[i] as usize <= d
+            let outside = 2 * outside_votes[i] as usize > d * per_sample;
+            f64::from(light) / d as f64 >= 0.2 * DARK && !outside
         })
         .collect();
     let kept = keep.iter().filter(|k| **k).count();
@@ -92,24 +103,24 @@ pub(crate) fn depths(
         return Err(Error::NoRoom("no light reaches its inside".to_owned()));
     }
     if kept < n {
-        compact(&mut density_length, &keep, d);
+        compact(&mut transmittance, &keep, d);
         if !matched {
             compact(&mut boundary, &keep, d);
         }
     }
-    let mut keep_samples = keep.iter();
-    let mut samples = placed.samples;
-    samples.retain(|_| keep_samples.next().copied().unwrap_or(false));
+    let mean = |points: &[DVec3]| points.iter().sum::<DVec3>() / points.len() as f64;
+    let kept_only = |i: &usize| keep[*i];
     Ok(Lit {
-        samples,
+        samples: (0..n).filter(kept_only).map(|i| placed.samples[i]).collect(),
+        centroids: (0..n).filter(kept_only).map(|i| mean(&points[i * per_sample..(i + 1) * per_sample])).collect(),
         probes: placed.probes,
         directions,
-        density_length,
+        transmittance,
         boundary,
         discarded: n - kept,
         snapped: placed.snapped,
         dark_candidates: placed.dark,
-        rays: (n * d) as u64,
+        rays: (n * per_sample * d) as u64,
     })
 }
 

@@ -10,7 +10,6 @@ use crate::Result;
 use crate::params::Params;
 use crate::progress::Stage;
 use diaphane_formats::encoding::Encoding;
-use diaphane_formats::medium::Medium;
 use diaphane_formats::sh::{coefficient_count, evaluate};
 use rayon::prelude::*;
 
@@ -23,7 +22,7 @@ pub(crate) struct Harmonics {
 const ITERATIONS: usize = 6;
 const DAMPING: f64 = 1e-4;
 
-pub(crate) fn harmonics(lit: &Lit, medium: &Medium, params: &Params, stage: Stage<'_>) -> Result<Harmonics> {
+pub(crate) fn harmonics(lit: &Lit, params: &Params, stage: Stage<'_>) -> Result<Harmonics> {
     let columns = coefficient_count(params.order);
     let mut values = Vec::with_capacity(lit.directions.len() * columns);
     let mut row = vec![0.0; columns];
@@ -32,7 +31,6 @@ pub(crate) fn harmonics(lit: &Lit, medium: &Medium, params: &Params, stage: Stag
         values.extend(row.iter().map(|v| *v as f32));
     }
     let basis = Basis { rows: lit.directions.len(), columns, values };
-    let kappa = medium.reference_extinction() as f32;
     let n = lit.samples.len();
     stage.expect(n);
     let mut depth = vec![0.0f32; n * columns];
@@ -42,8 +40,7 @@ pub(crate) fn harmonics(lit: &Lit, medium: &Medium, params: &Params, stage: Stag
         let mut fitter = Fitter::new(&basis, params.encoding);
         for (k, out) in depth.chunks_exact_mut(columns).enumerate() {
             let i = index * chunk + k;
-            let lengths = &lit.density_length[i * basis.rows..(i + 1) * basis.rows];
-            fitter.fit_depth(&basis, lengths, kappa, out);
+            fitter.fit_depth(&basis, &lit.transmittance[i * basis.rows..(i + 1) * basis.rows], out);
             if let Some(out) = boundary.chunks_exact_mut(columns).nth(k) {
                 fitter.fit_boundary(&basis, &lit.boundary[i * basis.rows..(i + 1) * basis.rows], out);
             }
@@ -111,10 +108,10 @@ impl Fitter {
         sum
     }
 
-    fn fit_depth(&mut self, basis: &Basis, lengths: &[f32], kappa: f32, out: &mut [f32]) {
-        for (d, m) in lengths.iter().enumerate() {
-            let tau = kappa * m;
-            self.psi[d] = (-tau).exp();
+    fn fit_depth(&mut self, basis: &Basis, transmittance: &[f32], out: &mut [f32]) {
+        for (d, psi) in transmittance.iter().enumerate() {
+            let tau = -psi.max(1e-30).ln();
+            self.psi[d] = *psi;
             self.target[d] = self.encoding.encode(f64::from(tau)) as f32;
             let slope = match self.encoding {
                 Encoding::Transmittance => 1.0,

@@ -1,5 +1,6 @@
 //! What every sample carries: optical depth over all directions as spherical harmonics, and the kernel's weight.
 
+mod cells;
 mod depths;
 mod gauss_newton;
 mod harmonics;
