@@ -49,8 +49,13 @@ struct Chunk {
 
 impl Chunk {
     /// Kernels without weight that are easy on the arithmetic.
-    const EMPTY: Self =
-        Self { tc: [0.0; LANES], d2: [0.0; LANES], a: [1.0; LANES], weight: [0.0; LANES], source: [[0.0; LANES]; 3] };
+    const EMPTY: Self = Self {
+        tc: [0.0; LANES],
+        d2: [0.0; LANES],
+        a: [1.0; LANES],
+        weight: [0.0; LANES],
+        source: [[0.0; LANES]; 3],
+    };
 }
 
 /// The part of each lane's support inside a piece, and its weight (0 where there is none).
@@ -121,8 +126,8 @@ impl Hits {
             if grey {
                 let w = path.weights(kappa.x, chunk, &clipped, end - start);
                 add(&mut denominator[0], &w);
-                for c in 0..3 {
-                    add_product(&mut numerator[c], &w, &chunk.source[c]);
+                for (sum, source) in numerator.iter_mut().zip(&chunk.source) {
+                    add_product(sum, &w, source);
                 }
             } else {
                 for c in 0..3 {
@@ -153,7 +158,11 @@ struct Path {
 
 impl Path {
     fn new(along: &Along, clipped: &Clipped, start: f32) -> Self {
-        let mut path = Self { before: [0.0; LANES], density: [1.0; LANES], scattering: [1.0; LANES] };
+        let mut path = Self {
+            before: [0.0; LANES],
+            density: [1.0; LANES],
+            scattering: [1.0; LANES],
+        };
         match along {
             Along::Uniform(_) => {
                 for k in 0..LANES {
@@ -185,7 +194,7 @@ impl Path {
         }
         let mut out = [0.0; LANES];
         if mild && long {
-            for k in 0..LANES {
+            for (k, out) in out.iter_mut().enumerate() {
                 let w = mild_integral(
                     chunk.a[k],
                     chunk.d2[k],
@@ -194,12 +203,19 @@ impl Path {
                     kappa * self.density[k],
                     kappa * self.before[k],
                 );
-                out[k] = w * (clipped.weight[k] * self.scattering[k]);
+                *out = w * (clipped.weight[k] * self.scattering[k]);
             }
         } else {
             for k in (0..LANES).filter(|&k| clipped.weight[k] > 0.0) {
                 let (from, to) = (clipped.from[k], clipped.from[k] + clipped.length[k]);
-                let g = kernel::integral(chunk.a[k], chunk.d2[k], chunk.tc[k], kappa * self.density[k], from, to);
+                let g = kernel::integral(
+                    chunk.a[k],
+                    chunk.d2[k],
+                    chunk.tc[k],
+                    kappa * self.density[k],
+                    from,
+                    to,
+                );
                 out[k] = g * (-kappa * self.before[k]).exp() * (clipped.weight[k] * self.scattering[k]);
             }
         }
@@ -220,7 +236,11 @@ fn add_product(sum: &mut Lanes, x: &Lanes, y: &Lanes) {
 }
 
 fn clip(chunk: &Chunk, start: f32, end: f32) -> Clipped {
-    let mut clipped = Clipped { from: [0.0; LANES], length: [0.0; LANES], weight: [0.0; LANES] };
+    let mut clipped = Clipped {
+        from: [0.0; LANES],
+        length: [0.0; LANES],
+        weight: [0.0; LANES],
+    };
     for k in 0..LANES {
         let h2 = CUT_OFF / (chunk.a[k] * chunk.a[k]) - chunk.d2[k];
         let reach = h2.max(0.0).sqrt();
@@ -277,7 +297,7 @@ fn erf(x: f32) -> f32 {
     let x = if x < 3.95 { x } else { 3.95 };
     let s = x * x;
     let p = 3.917_343e-3 + s * (2.876_014_2e-4 + s * 2.011_740_3e-6);
-    let p = 1.128_379 + s * (0.194_036_25 + s * (0.053_207_136 + s * p));
+    let p = std::f32::consts::FRAC_2_SQRT_PI + s * (0.194_036_25 + s * (0.053_207_136 + s * p));
     let q = 1.527_075_1e-2 + s * (1.198_207_5e-3 + s * 3.783_973e-5);
     let q = 1.0 + s * (0.505_291_64 + s * (0.115_590_99 + s * q));
     x * p / q
@@ -292,9 +312,16 @@ mod tests {
         for i in 0..=40_000 {
             let x = -86.0 + 174.0 * i as f32 / 40_000.0;
             let exact = f64::from(x).exp();
-            assert!((f64::from(exp(x)) / exact - 1.0).abs() < 3e-7, "exp {x}: {} {exact}", exp(x));
+            assert!(
+                (f64::from(exp(x)) / exact - 1.0).abs() < 3e-7,
+                "exp {x}: {} {exact}",
+                exp(x)
+            );
             let x = -6.0 + 12.0 * i as f32 / 40_000.0;
-            assert!((f64::from(erf(x)) - libm::erf(f64::from(x))).abs() < 5e-7, "erf {x}");
+            assert!(
+                (f64::from(erf(x)) - libm::erf(f64::from(x))).abs() < 5e-7,
+                "erf {x}"
+            );
         }
         assert!(exp(-1e30) < 1e-37 && exp(f32::NEG_INFINITY) < 1e-37);
     }
@@ -308,11 +335,17 @@ mod tests {
                 let kappa = a * unit(0);
                 let d2 = CUT_OFF / (a * a) * unit(1);
                 let (start, piece, tc) = (2.0 / a, 5.0 * unit(2) / a, (1.0 + 6.0 * unit(3)) / a);
-                let Some((from, to)) = kernel::clip(a, d2, tc, start, start + piece) else { continue };
+                let Some((from, to)) = kernel::clip(a, d2, tc, start, start + piece) else {
+                    continue;
+                };
                 let before = kappa * (from - start);
                 let exact = kernel::integral(a, d2, tc, kappa, from, to) * (-before).exp();
                 let got = mild_integral(a, d2, from - tc, to - from, kappa, before);
-                assert!((got - exact).abs() <= 6e-6 / a, "a {a} κ {kappa}: {got} {exact} {}", (got - exact) * a);
+                assert!(
+                    (got - exact).abs() <= 6e-6 / a,
+                    "a {a} κ {kappa}: {got} {exact} {}",
+                    (got - exact) * a
+                );
             }
         }
     }
@@ -322,7 +355,13 @@ mod tests {
         let mut hits = Hits::default();
         let along = Along::Uniform(Vec3::ONE);
         assert_eq!(hits.piece_radiance(0.0, 2.0, &along), PieceSum::default());
-        hits.push(Hit { tc: 1.0, d2: 0.1, a: 2.0, weight: 0.5, source: Vec3::new(1.0, 2.0, 3.0) });
+        hits.push(Hit {
+            tc: 1.0,
+            d2: 0.1,
+            a: 2.0,
+            weight: 0.5,
+            source: Vec3::new(1.0, 2.0, 3.0),
+        });
         let sum = hits.piece_radiance(0.0, 2.0, &along);
         assert_eq!(sum.splats, 1);
         let exact = Vec3::new(1.0, 2.0, 3.0) * (1.0 - (-2.0f32).exp());

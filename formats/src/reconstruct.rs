@@ -37,8 +37,11 @@ impl Cloud {
     /// Kernels of an asset's samples.
     pub fn new(samples: &Samples, width_factor: f32) -> Self {
         let centre: Vec<Vec3> = (0..samples.len()).map(|i| samples.position(i)).collect();
-        let sharpness: Vec<f32> =
-            samples.position_radius.iter().map(|p| kernel::sharpness(p[3], width_factor)).collect();
+        let sharpness: Vec<f32> = samples
+            .position_radius
+            .iter()
+            .map(|p| kernel::sharpness(p[3], width_factor))
+            .collect();
         Self::from_parts(centre, sharpness, samples.weight.clone())
     }
 
@@ -57,17 +60,30 @@ impl Cloud {
         } else {
             build_bvh2(&boxes, BvhBuildParams::fast_build(), &mut Default::default())
         };
-        Self { centre, sharpness, weight, bvh }
+        Self {
+            centre,
+            sharpness,
+            weight,
+            bvh,
+        }
     }
 
     /// Calls `visit` with every kernel whose support may meet the ray between `start` and `end`.
-    pub fn for_each_near_ray(&self, origin: Vec3, direction: Vec3, start: f32, end: f32, mut visit: impl FnMut(usize)) {
+    pub fn for_each_near_ray(
+        &self,
+        origin: Vec3,
+        direction: Vec3,
+        start: f32,
+        end: f32,
+        mut visit: impl FnMut(usize),
+    ) {
         if self.centre.is_empty() {
             return;
         }
         let from = Vec3A::from(origin + direction * start);
         let ray = Ray::new(from, Vec3A::from(direction) + Vec3A::ZERO, 0.0, end - start);
-        self.bvh.ray_traverse_anyhit(ray, |_, slot| visit(self.bvh.primitive_indices[slot] as usize));
+        self.bvh
+            .ray_traverse_anyhit(ray, |_, slot| visit(self.bvh.primitive_indices[slot] as usize));
     }
 
     /// Calls `visit` with every kernel whose support may hold the point.
@@ -111,8 +127,12 @@ impl Profile {
         const SUBSTEPS: usize = 2;
         let cell = (end - start) / PROFILE_CELLS as f32;
         let h = cell / SUBSTEPS as f32;
-        let mut profile =
-            Self { start, cell, density: [0.0; PROFILE_CELLS + 1], scattering: [0.0; PROFILE_CELLS + 1] };
+        let mut profile = Self {
+            start,
+            cell,
+            density: [0.0; PROFILE_CELLS + 1],
+            scattering: [0.0; PROFILE_CELLS + 1],
+        };
         let mut sum = [0.0f32; 2];
         for k in 0..PROFILE_CELLS {
             for s in 0..SUBSTEPS {
@@ -149,9 +169,10 @@ impl Along {
     /// A of the module's head, per channel.
     pub fn emission(&self, start: f32, end: f32) -> Vec3 {
         match self {
-            Self::Uniform(kappa) => {
-                (*kappa * (end - start)).to_array().map(|y| y * kernel::decay_mean(y)).into()
-            }
+            Self::Uniform(kappa) => (*kappa * (end - start))
+                .to_array()
+                .map(|y| y * kernel::decay_mean(y))
+                .into(),
             Self::Profile(kappa, p) => {
                 let mut sum = Vec3::ZERO;
                 for k in 0..PROFILE_CELLS {
@@ -192,7 +213,13 @@ pub fn piece_radiance(
         let d2 = (to_centre - direction * tc).length_squared();
         let a = cloud.sharpness[i];
         if a * a * d2 < kernel::CUT_OFF {
-            hits.push(Hit { tc, d2, a, weight: cloud.weight[i], source: source[i] });
+            hits.push(Hit {
+                tc,
+                d2,
+                a,
+                weight: cloud.weight[i],
+                source: source[i],
+            });
         }
     });
     hits.piece_radiance(start, end, along)
@@ -222,10 +249,21 @@ mod tests {
         for kappa in [0.0, 0.1, 3.0, 40.0] {
             let along = Along::Uniform(Vec3::new(kappa, 2.0 * kappa, 0.5 * kappa));
             let direction = Vec3::new(0.1, 0.2, -1.0).normalize();
-            let sum = piece_radiance(&cloud, &source, Vec3::new(0.0, 0.0, 3.0), direction, 2.4, 3.7, &along);
+            let sum = piece_radiance(
+                &cloud,
+                &source,
+                Vec3::new(0.0, 0.0, 3.0),
+                direction,
+                2.4,
+                3.7,
+                &along,
+            );
             for (c, factor) in [(0, 1.0), (1, 2.0), (2, 0.5)] {
                 let exact = source[0][c] * (1.0 - (-kappa * factor * 1.3f32).exp());
-                assert!((sum.radiance[c] - exact).abs() <= 2e-5 * exact.max(1e-3), "{kappa} {c}");
+                assert!(
+                    (sum.radiance[c] - exact).abs() <= 2e-5 * exact.max(1e-3),
+                    "{kappa} {c}"
+                );
             }
         }
     }
@@ -247,19 +285,31 @@ mod tests {
         let b = Along::Uniform(0.5 * kappa);
         let x = piece_radiance(&cloud, &source, origin, direction, 2.3, 3.7, &a);
         let y = piece_radiance(&cloud, &source, origin, direction, 2.3, 3.7, &b);
-        assert!((x.radiance - y.radiance).length() < 1e-4 * y.radiance.length(), "{x:?} {y:?}");
+        assert!(
+            (x.radiance - y.radiance).length() < 1e-4 * y.radiance.length(),
+            "{x:?} {y:?}"
+        );
         assert!((a.transmittance(2.3, 3.7) - b.transmittance(2.3, 3.7)).length() < 1e-5);
     }
 
     /// The sum of the module's head, kernel by kernel without lanes or hierarchy.
-    fn simple(cloud: &Cloud, source: &[Vec3], origin: Vec3, direction: Vec3, ends: [f32; 2], along: &Along) -> PieceSum {
+    fn simple(
+        cloud: &Cloud,
+        source: &[Vec3],
+        origin: Vec3,
+        direction: Vec3,
+        ends: [f32; 2],
+        along: &Along,
+    ) -> PieceSum {
         let [start, end] = ends;
         let (mut numerator, mut denominator, mut splats) = (Vec3::ZERO, Vec3::ZERO, 0);
         for (i, centre) in cloud.centre.iter().enumerate() {
             let tc = (*centre - origin).dot(direction);
             let d2 = (*centre - origin - direction * tc).length_squared();
             let a = cloud.sharpness[i];
-            let Some((from, to)) = kernel::clip(a, d2, tc, start, end) else { continue };
+            let Some((from, to)) = kernel::clip(a, d2, tc, start, end) else {
+                continue;
+            };
             let weigh = |k: f32| match along {
                 Along::Uniform(_) => (-k * (from - start)).exp() * kernel::integral(a, d2, tc, k, from, to),
                 Along::Profile(_, p) => {
@@ -275,7 +325,10 @@ mod tests {
             splats += 1;
         }
         let mean = Vec3::select(denominator.cmpgt(Vec3::ZERO), numerator / denominator, Vec3::ZERO);
-        PieceSum { radiance: along.emission(start, end) * mean, splats }
+        PieceSum {
+            radiance: along.emission(start, end) * mean,
+            splats,
+        }
     }
 
     #[test]
@@ -286,9 +339,18 @@ mod tests {
             *w = 0.5 + unit(1, i as u64);
         }
         let count = cloud.centre.len() as u64;
-        let source: Vec<Vec3> = (0..count).map(|i| Vec3::new(unit(i, 2), unit(i, 3), unit(i, 4))).collect();
-        let values = (0..512).map(|i| [unit(i, 5), unit(i, 6)].map(|v| half::f16::from_f32(2.0 * v))).collect();
-        let grid = DensityGrid { size: [8; 3], min: [-1.0; 3], max: [1.0; 3], values };
+        let source: Vec<Vec3> = (0..count)
+            .map(|i| Vec3::new(unit(i, 2), unit(i, 3), unit(i, 4)))
+            .collect();
+        let values = (0..512)
+            .map(|i| [unit(i, 5), unit(i, 6)].map(|v| half::f16::from_f32(2.0 * v)))
+            .collect();
+        let grid = DensityGrid {
+            size: [8; 3],
+            min: [-1.0; 3],
+            max: [1.0; 3],
+            values,
+        };
         for i in 0..2000 {
             let origin = Vec3::new(unit(i, 7), unit(i, 8), unit(i, 9)) * 0.4 + Vec3::Z * 3.0;
             let direction = Vec3::new(unit(i, 10) - 0.5, unit(i, 11) - 0.5, -4.0).normalize();
@@ -303,7 +365,10 @@ mod tests {
                     let error = (got.radiance - exact.radiance).length();
                     // Errors are relative to whole kernels: a ray that only grazes a few rims has tiny weights.
                     let bound = if exact.splats < 8 { 1e-3 } else { 2e-5 };
-                    assert!(error <= bound * exact.radiance.length() + 1e-9, "{along:?} {got:?} {exact:?}");
+                    assert!(
+                        error <= bound * exact.radiance.length() + 1e-9,
+                        "{along:?} {got:?} {exact:?}"
+                    );
                     // Rounding at the rim of a support may count a kernel more or less.
                     assert!(got.splats.abs_diff(exact.splats) <= 1);
                 }

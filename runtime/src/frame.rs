@@ -149,7 +149,9 @@ impl Frame {
         let inside = |l: &FrameLight| {
             l.kind != LightKind::Directional && l.position.cmpgt(low).all() && l.position.cmplt(high).all()
         };
-        (0..self.scene_lights).filter(|&i| inside(&self.lights[i])).collect()
+        (0..self.scene_lights)
+            .filter(|&i| inside(&self.lights[i]))
+            .collect()
     }
 }
 
@@ -164,16 +166,27 @@ fn frame_light(light: &Light, centre: DVec3) -> FrameLight {
         cos_outer: -1.0,
     };
     match *light {
-        Light::Point { position, intensity } => {
-            FrameLight { position: local(position), colour: intensity.as_vec3(), ..base }
-        }
-        Light::Directional { direction, irradiance } => FrameLight {
+        Light::Point { position, intensity } => FrameLight {
+            position: local(position),
+            colour: intensity.as_vec3(),
+            ..base
+        },
+        Light::Directional {
+            direction,
+            irradiance,
+        } => FrameLight {
             kind: LightKind::Directional,
             direction: direction.as_vec3(),
             colour: irradiance.as_vec3(),
             ..base
         },
-        Light::Spot { position, direction, intensity, cos_inner, cos_outer } => FrameLight {
+        Light::Spot {
+            position,
+            direction,
+            intensity,
+            cos_inner,
+            cos_outer,
+        } => FrameLight {
             kind: LightKind::Spot,
             position: local(position),
             direction: direction.as_vec3(),
@@ -217,14 +230,18 @@ fn project_environment(environment: &Environment) -> Vec<DVec3> {
     for row in 0..picture.height {
         let theta = PI * (row as f64 + 0.5) / picture.height as f64;
         // Exact solid angle of the row's band, shared by its pixels.
-        let (top, bottom) = (PI * row as f64 / picture.height as f64, PI * (row + 1) as f64 / picture.height as f64);
+        let (top, bottom) = (
+            PI * row as f64 / picture.height as f64,
+            PI * (row + 1) as f64 / picture.height as f64,
+        );
         let solid_angle = TAU / picture.width as f64 * (top.cos() - bottom.cos());
         for column in 0..picture.width {
             let phi = TAU * ((column as f64 + 0.5) / picture.width as f64 - 0.5);
             let direction = [theta.sin() * phi.sin(), theta.cos(), -theta.sin() * phi.cos()];
             sh::evaluate(MAX_ORDER, direction, &mut basis);
             let p = picture.pixels[row * picture.width + column];
-            let radiance = DVec3::new(p[0].into(), p[1].into(), p[2].into()) * environment.scale * solid_angle;
+            let radiance =
+                DVec3::new(p[0].into(), p[1].into(), p[2].into()) * environment.scale * solid_angle;
             for (s, y) in sum.iter_mut().zip(&basis) {
                 *s += radiance * *y;
             }
@@ -245,7 +262,10 @@ mod tests {
         let lights = environment_lights(&Environment { picture, scale: 0.5 });
         let sum: Vec3 = lights.iter().map(|l| l.colour).sum();
         let expected = 2.0 * std::f32::consts::PI;
-        assert!((sum.x / expected - 1.0).abs() < 1e-3 && (sum.y / (2.0 * expected) - 1.0).abs() < 1e-3, "{sum}");
+        assert!(
+            (sum.x / expected - 1.0).abs() < 1e-3 && (sum.y / (2.0 * expected) - 1.0).abs() < 1e-3,
+            "{sum}"
+        );
         assert_eq!(sum.z, 0.0);
     }
 
@@ -259,7 +279,10 @@ mod tests {
             }
         }
         let lights = environment_lights(&Environment { picture, scale: 1.0 });
-        let brightest = lights.iter().max_by(|a, b| a.colour.x.total_cmp(&b.colour.x)).unwrap();
+        let brightest = lights
+            .iter()
+            .max_by(|a, b| a.colour.x.total_cmp(&b.colour.x))
+            .unwrap();
         assert!(brightest.direction.x < -0.9, "{:?}", brightest.direction);
     }
 }

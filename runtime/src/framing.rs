@@ -10,23 +10,38 @@ pub fn default_scene(info: &Info) -> Scene {
     let centre = DVec3::from(info.centre);
     let radius = 0.5 * f64::from(info.diagonal());
     let fov: f64 = 30.0;
-    // The bounding sphere touches the cone of view at this distance; 5 % more leaves a margin.
-    let distance = 1.05 * radius / (0.5 * fov.to_radians()).sin();
-    let diagonal_view = DVec3::new(0.0, 1.0, 1.0).normalize();
+    let view = DVec3::new(0.0, 1.0, 1.0).normalize();
+    // From here every corner of the bounding box is within the picture; 8 % more leaves a margin.
+    let up = view.cross(DVec3::X);
+    let slope = (0.5 * fov.to_radians()).tan();
+    let corner = |i: usize| DVec3::from_array([0, 1, 2].map(|k| f64::from(info.bounds[(i >> k) & 1][k])));
+    let needed = |p: DVec3| p.dot(view) + p.x.abs().max(p.dot(up).abs()) / slope;
+    let distance = 1.08 * (0..8).map(|i| needed(corner(i))).fold(radius, f64::max);
     let light = |direction: DVec3, colour: DVec3| {
         let away = 2.5 * radius;
         let position = centre + direction.normalize() * away;
-        Light::Point { position, intensity: colour * (4.0 * away * away) }
+        Light::Point {
+            position,
+            intensity: colour * (4.0 * away * away),
+        }
     };
     Scene {
         camera: Camera {
-            position: centre + diagonal_view * distance,
+            position: centre + view * distance,
             target: centre,
             up: DVec3::Y,
             vertical_fov_degrees: fov,
         },
-        image: ImageSize { width: 512, height: 512, samples_per_pixel: 4 },
-        surface: Surface { reflection: true, specular: 0.5, roughness: 0.3 },
+        image: ImageSize {
+            width: 512,
+            height: 512,
+            samples_per_pixel: 4,
+        },
+        surface: Surface {
+            reflection: true,
+            specular: 0.5,
+            roughness: 0.3,
+        },
         environment: None,
         lights: vec![
             light(DVec3::new(1.0, 0.6, 0.5), DVec3::new(1.0, 0.75, 0.5)),

@@ -9,8 +9,8 @@
 pub mod cpu;
 pub mod exact;
 pub mod frame;
-pub mod gpu;
 pub mod framing;
+pub mod gpu;
 pub mod player;
 pub mod rendered;
 pub mod usable;

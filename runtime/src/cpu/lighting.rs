@@ -56,8 +56,12 @@ impl Lighting {
 
     /// The source of every sample, in the samples' order; parallel over samples.
     pub fn sources(&self, samples: &Samples, frame: &Frame, exact: Option<&ExactDepths>) -> Vec<Vec3> {
-        let lights: Vec<Prepared> =
-            frame.lights.iter().enumerate().map(|(l, light)| self.prepare(l, light, samples, exact)).collect();
+        let lights: Vec<Prepared> = frame
+            .lights
+            .iter()
+            .enumerate()
+            .map(|(l, light)| self.prepare(l, light, samples, exact))
+            .collect();
         (0..samples.len())
             .into_par_iter()
             .with_min_len(256)
@@ -72,13 +76,19 @@ impl Lighting {
         samples: &Samples,
         exact: Option<&'a ExactDepths>,
     ) -> Prepared<'a> {
-        let table = exact.and_then(|e| e.light(index)).filter(|t| t.len() == samples.len());
+        let table = exact
+            .and_then(|e| e.light(index))
+            .filter(|t| t.len() == samples.len());
         let basis = (light.kind == LightKind::Directional).then(|| {
             let mut basis = vec![0.0; self.order * self.order];
             sh::evaluate_f32(self.order, (-light.direction).to_array(), &mut basis);
             basis
         });
-        Prepared { light, basis, exact: table }
+        Prepared {
+            light,
+            basis,
+            exact: table,
+        }
     }
 
     fn source(&self, samples: &Samples, i: usize, frame: &Frame, lights: &[Prepared]) -> Vec3 {
@@ -118,12 +128,18 @@ impl Lighting {
     /// ψ β from the coefficients, per channel, 0..1.
     fn arriving(&self, depth: &[f32], boundary: Option<&[f32]>, basis: &[f32]) -> Vec3 {
         let through = boundary.map_or(1.0, |b| dot(b, basis).clamp(0.0, 1.0));
-        let Some(ratio) = self.ratio else { return Vec3::splat(through) };
+        let Some(ratio) = self.ratio else {
+            return Vec3::splat(through);
+        };
         let tau = self.encoding.decode(dot(depth, basis));
         if tau == f32::INFINITY || through == 0.0 {
             return Vec3::ZERO;
         }
-        if ratio == Vec3::ONE { Vec3::splat((-tau).exp() * through) } else { (-ratio * tau).exp() * through }
+        if ratio == Vec3::ONE {
+            Vec3::splat((-tau).exp() * through)
+        } else {
+            (-ratio * tau).exp() * through
+        }
     }
 }
 

@@ -33,7 +33,13 @@ impl RayMedium<'_> {
 }
 
 /// Radiance of a ray's samples, given the kernels that its line meets, and the number that contributed.
-pub fn ray(hits: &Hits, medium: RayMedium, origin: Vec3, direction: Vec3, segments: &Segments) -> (Vec3, u32) {
+pub fn ray(
+    hits: &Hits,
+    medium: RayMedium,
+    origin: Vec3,
+    direction: Vec3,
+    segments: &Segments,
+) -> (Vec3, u32) {
     let (mut radiance, mut splats, mut before) = (Vec3::ZERO, 0, Vec3::ONE);
     for piece in segments.pieces().iter().filter(|p| p.end > p.start) {
         let along = medium.along(origin, direction, piece.start, piece.end);

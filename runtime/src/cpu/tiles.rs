@@ -36,7 +36,10 @@ pub struct Rect {
 impl Rect {
     /// The whole picture.
     pub fn all(frame: &Frame) -> Self {
-        Self { low: [0, 0], high: [frame.width, frame.height] }
+        Self {
+            low: [0, 0],
+            high: [frame.width, frame.height],
+        }
     }
 
     /// Squares of `side` pixels that cover this rectangle, row by row; those at the end may be narrower.
@@ -44,7 +47,12 @@ impl Rect {
         let starts = |k: usize| (self.low[k]..self.high[k]).step_by(side as usize);
         let end = |k: usize, start: u32| start.saturating_add(side).min(self.high[k]);
         starts(1)
-            .flat_map(|y| starts(0).map(move |x| Self { low: [x, y], high: [end(0, x), end(1, y)] }))
+            .flat_map(|y| {
+                starts(0).map(move |x| Self {
+                    low: [x, y],
+                    high: [end(0, x), end(1, y)],
+                })
+            })
             .collect()
     }
 
@@ -71,11 +79,15 @@ impl Cone {
         let cosine = corners.iter().map(|c| c.dot(axis)).fold(1.0, f32::min);
         // Widened by more than the rounding of directions.
         let cosine = cosine - 1e-6;
-        Self { axis, cosine, sine: (1.0 - cosine * cosine).max(0.0).sqrt() }
+        Self {
+            axis,
+            cosine,
+            sine: (1.0 - cosine * cosine).max(0.0).sqrt(),
+        }
     }
 
     fn may_meet(&self, centre: Vec3, radius: f32) -> bool {
-        if !(self.cosine > LEAST_COSINE) {
+        if self.cosine <= LEAST_COSINE || self.cosine.is_nan() {
             return true;
         }
         let along = centre.dot(self.axis);
@@ -98,9 +110,16 @@ pub fn kernels(cloud: &Cloud, camera: Vec3) -> Vec<Kernel> {
     let kernel = |i: usize| {
         let centre = cloud.centre[i] - camera;
         let radius = CUT_OFF_RADIUS / cloud.sharpness[i] * 1.001 + centre.length() * 1e-6;
-        Kernel { centre, radius, index: i as u32 }
+        Kernel {
+            centre,
+            radius,
+            index: i as u32,
+        }
     };
-    (0..cloud.centre.len()).filter(|&i| cloud.weight[i] > 0.0).map(kernel).collect()
+    (0..cloud.centre.len())
+        .filter(|&i| cloud.weight[i] > 0.0)
+        .map(kernel)
+        .collect()
 }
 
 /// Those of `kernels` that rays of `rect` may meet, into `out` (cleared).
@@ -145,9 +164,10 @@ impl Candidates {
             for (lane, kernel) in group.iter().enumerate() {
                 let i = kernel.index as usize;
                 let a = cloud.sharpness[i];
+                let source = sources[i];
                 for c in 0..3 {
                     chunk.centre[c][lane] = kernel.centre[c];
-                    chunk.source[c][lane] = sources[i][c];
+                    chunk.source[c][lane] = source[c];
                 }
                 chunk.support2[lane] = CUT_OFF / (a * a);
                 chunk.a[lane] = a;
@@ -175,7 +195,11 @@ impl Candidates {
             let [x, y, z] = &chunk.centre;
             for k in 0..LANES {
                 let t = x[k] * direction.x + y[k] * direction.y + z[k] * direction.z;
-                let (px, py, pz) = (x[k] - direction.x * t, y[k] - direction.y * t, z[k] - direction.z * t);
+                let (px, py, pz) = (
+                    x[k] - direction.x * t,
+                    y[k] - direction.y * t,
+                    z[k] - direction.z * t,
+                );
                 tc[k] = t;
                 d2[k] = px * px + py * py + pz * pz;
                 inside[k] = chunk.support2[k] - d2[k];
@@ -183,7 +207,13 @@ impl Candidates {
             for k in 0..LANES {
                 if inside[k] > 0.0 {
                     let source = Vec3::new(chunk.source[0][k], chunk.source[1][k], chunk.source[2][k]);
-                    hits.push(Hit { tc: tc[k], d2: d2[k], a: chunk.a[k], weight: chunk.weight[k], source });
+                    hits.push(Hit {
+                        tc: tc[k],
+                        d2: d2[k],
+                        a: chunk.a[k],
+                        weight: chunk.weight[k],
+                        source,
+                    });
                 }
             }
         }

@@ -21,7 +21,7 @@ fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             // One line, whatever a message quotes.
-            eprintln!("error: {}", format!("{error:#}").replace(['\n', '\r'], " "));
+            eprintln!("error: {}", error.to_string().replace(['\n', '\r'], " "));
             ExitCode::from(2)
         }
     }

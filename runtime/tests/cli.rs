@@ -1,0 +1,165 @@
+//! `diaphane-play` without a window: what it writes, and what it refuses with exit code 2 and one line.
+
+mod support;
+
+use diaphane_formats::{asset, picture};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+/// A fresh folder with `ball.dph` and `a.scene.toml`.
+fn folder(name: &str) -> PathBuf {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+    let _ = std::fs::remove_dir_all(&folder);
+    std::fs::create_dir_all(&folder).unwrap();
+    let ball = support::ball(0.3, glam::DVec3::ZERO, diaphane_formats::phase::Phase::Isotropic);
+    asset::write(&folder.join("ball.dph"), &ball).unwrap();
+    std::fs::write(folder.join("a.scene.toml"), SCENE).unwrap();
+    folder
+}
+
+const SCENE: &str = "\
+[camera]
+position = [0.4, 0.6, 4.6]
+target = [0, 0, 0]
+vertical_fov_degrees = 28
+[image]
+width = 12
+height = 10
+samples_per_pixel = 2
+[[lights]]
+type = \"point\"
+position = [3, 1, 1]
+intensity = [30, 10, 6]
+";
+
+fn play(folder: &Path, arguments: &[&str]) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_diaphane-play"));
+    command.current_dir(folder).args(arguments).output().unwrap()
+}
+
+#[test]
+fn writes_picture_and_statistics() {
+    let folder = folder("writes");
+    let arguments = [
+        "ball.dph",
+        "--scene",
+        "a.scene.toml",
+        "--backend",
+        "cpu",
+        "--frames",
+        "3",
+    ];
+    let done = play(
+        &folder,
+        &[&arguments[..], &["--output", "o.exr", "--stats", "s.json"]].concat(),
+    );
+    assert!(done.status.success(), "{done:?}");
+    let picture = picture::read_exr(&folder.join("o.exr")).unwrap();
+    assert_eq!((picture.width, picture.height), (12, 10));
+    let coverage = picture.coverage.unwrap();
+    assert!(coverage[0] == 0.0 && coverage[5 * 12 + 6] == 1.0 && picture.pixels[5 * 12 + 6][0] > 0.0);
+    let text = std::fs::read_to_string(folder.join("s.json")).unwrap();
+    let stats: serde_json::Value = serde_json::from_str(&text).unwrap();
+    assert_eq!(stats["backend"], "cpu");
+    assert_eq!(
+        (&stats["width"], &stats["lights"], &stats["frames"]),
+        (&12.into(), &1.into(), &3.into())
+    );
+    for key in [
+        "adapter",
+        "height",
+        "samples",
+        "samples_drawn",
+        "splats_per_pixel",
+        "pass_ms",
+        "counters",
+    ] {
+        assert!(!stats[key].is_null(), "{key}");
+    }
+    for time in ["min", "median", "max"] {
+        assert!(stats["frame_ms"][time].is_number() && stats["pass_ms"]["splat"][time].is_number());
+    }
+    let png = play(
+        &folder,
+        &[&arguments[..], &["--output", "o.png", "--reuse"]].concat(),
+    );
+    assert!(png.status.success());
+    assert!(
+        std::fs::read(folder.join("o.png"))
+            .unwrap()
+            .starts_with(b"\x89PNG")
+    );
+}
+
+#[test]
+fn no_lights_is_black_with_a_warning() {
+    let folder = folder("dark");
+    let dark = SCENE.split("[[lights]]").next().unwrap();
+    std::fs::write(folder.join("dark.toml"), dark).unwrap();
+    let arguments = [
+        "ball.dph",
+        "--scene",
+        "dark.toml",
+        "--backend",
+        "cpu",
+        "--output",
+        "o.exr",
+    ];
+    let done = play(&folder, &arguments);
+    assert!(done.status.success() && String::from_utf8_lossy(&done.stderr).contains("no lights"));
+    let picture = picture::read_exr(&folder.join("o.exr")).unwrap();
+    assert!(picture.pixels.iter().flatten().all(|v| *v == 0.0));
+}
+
+#[test]
+fn refuses_bad_input_in_one_line() {
+    let folder = folder("refuses");
+    let write = |name: &str, text: String| std::fs::write(folder.join(name), text).unwrap();
+    write("zero.toml", SCENE.replace("width = 12", "width = 0"));
+    write("misspelt.toml", SCENE.replace("width = 12", "widht = 12"));
+    write("on_target.toml", SCENE.replace("[0.4, 0.6, 4.6]", "[0, 0, 0]"));
+    write("scene.png", SCENE.to_owned());
+    let bytes = std::fs::read(folder.join("ball.dph")).unwrap();
+    std::fs::write(folder.join("cut.dph"), &bytes[..bytes.len() / 2]).unwrap();
+    std::fs::write(folder.join("input.exr"), &bytes).unwrap();
+    let cases: [(&[&str], &str); 10] = [
+        (&["missing.dph", "--output", "o.png"], "missing.dph"),
+        (&["cut.dph", "--output", "o.png"], "cut.dph"),
+        (&["a.scene.toml", "--output", "o.png"], "a.scene.toml"),
+        (&["ball.dph", "--output", "o.jpg"], ".exr or .png"),
+        (&["ball.dph", "--output", "nowhere/o.png"], "cannot write"),
+        (&["input.exr", "--output", "./input.exr"], "both input and output"),
+        (
+            &["ball.dph", "--scene", "scene.png", "--output", "scene.png"],
+            "both input and output",
+        ),
+        (
+            &["ball.dph", "--scene", "zero.toml", "--output", "o.png"],
+            "image.width",
+        ),
+        (
+            &["ball.dph", "--scene", "misspelt.toml", "--output", "o.png"],
+            "'width'",
+        ),
+        (
+            &["ball.dph", "--scene", "on_target.toml", "--output", "o.png"],
+            "same point",
+        ),
+    ];
+    for (arguments, expected) in cases {
+        let done = play(&folder, arguments);
+        let said = String::from_utf8(done.stderr).unwrap();
+        assert_eq!(done.status.code(), Some(2), "{arguments:?}: {said}");
+        assert!(
+            said.contains(expected) && said.trim_end().lines().count() == 1,
+            "{arguments:?}: {said}"
+        );
+        assert!(!folder.join("o.png").exists(), "{arguments:?}");
+    }
+    for arguments in [
+        ["ball.dph", "--output", "o.png", "--frames", "0"],
+        ["ball.dph", "-x", "", "", ""],
+    ] {
+        assert_eq!(play(&folder, &arguments).status.code(), Some(2));
+    }
+}
