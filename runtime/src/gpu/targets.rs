@@ -23,6 +23,7 @@ const TOTAL: u64 = 512 << 20;
 const CROSSINGS: u64 = 40;
 const BOUNDARY: u64 = 48;
 const PIECE: u64 = 16;
+const CELL: u64 = 8;
 const PROFILE: u64 = 8 * (PROFILE_CELLS as u64 + 1);
 
 /// Buffers and textures for a tile of a given number of columns and rows.
@@ -38,6 +39,9 @@ pub(super) struct Targets {
     pub counters: Buffer,
     pub profile: Buffer,
     pub arguments: Buffer,
+    /// Cells of 8 × 8 pixels, padded as `stride`.
+    cell_stride: u64,
+    pub cells: Buffer,
     pub marker: TextureView,
     pub numerator: TextureView,
     pub denominator: TextureView,
@@ -64,6 +68,12 @@ impl Targets {
     pub fn new(device: &Device, asset: &AssetBuffers, tile: Tile) -> Self {
         let pixels = tile.pixels();
         let stride = pixels.next_multiple_of(16);
+        let cell_stride = tile
+            .size
+            .iter()
+            .map(|n| u64::from(n.div_ceil(8)))
+            .product::<u64>()
+            .next_multiple_of(32);
         let state = BufferUsages::STORAGE | BufferUsages::COPY_DST;
         let read = state | BufferUsages::COPY_SRC;
         let buffer = |label: &str, size: u64, usage| empty_buffer(device, label, size, usage);
@@ -107,6 +117,8 @@ impl Targets {
                 ARGUMENTS * MAX_PIECES as u64,
                 state | BufferUsages::INDIRECT,
             ),
+            cells: buffer("cells", CELL * MAX_PIECES as u64 * cell_stride, state),
+            cell_stride,
             marker: texture("marker", MARKER_FORMAT),
             numerator: texture("numerator", SUM_FORMAT),
             denominator: texture("denominator", SUM_FORMAT),
@@ -119,6 +131,15 @@ impl Targets {
             buffer: &self.pieces,
             offset: k as u64 * self.stride * PIECE,
             size: wgpu::BufferSize::new(self.stride * PIECE),
+        })
+    }
+
+    /// Ranges of piece `k` in every cell.
+    pub fn piece_cells(&self, k: usize) -> wgpu::BindingResource<'_> {
+        wgpu::BindingResource::Buffer(BufferBinding {
+            buffer: &self.cells,
+            offset: k as u64 * self.cell_stride * CELL,
+            size: wgpu::BufferSize::new(self.cell_stride * CELL),
         })
     }
 

@@ -19,6 +19,12 @@ const ARGUMENTS: u32 = 8u; // draw (4), dispatch (3), unused
 // Rays that hit, pieces dropped, kernels, rays without a kernel.
 @group(1) @binding(5) var<storage, read_write> counters: array<vec4u>;
 @group(1) @binding(6) var<storage, read_write> arguments: array<atomic<u32>>;
+// Least start and greatest end of each piece over the 8 x 8 pixels of a workgroup: piece k of cell c at
+// [k * stride + c].
+@group(1) @binding(7) var<storage, read_write> cells: array<vec2f>;
+
+var<workgroup> cell_start: array<atomic<u32>, 4>;
+var<workgroup> cell_end: array<atomic<u32>, 4>;
 
 fn through(index: u32, slot: u32) -> f32 {
     if (FRESNEL) {
@@ -28,11 +34,34 @@ fn through(index: u32, slot: u32) -> f32 {
 }
 
 @compute @workgroup_size(8, 8)
-fn segments(@builtin(global_invocation_id) pixel: vec3u) {
-    if (any(pixel.xy >= view.tile_size)) {
-        return;
+fn segments(
+    @builtin(global_invocation_id) pixel: vec3u,
+    @builtin(workgroup_id) cell: vec3u,
+    @builtin(num_workgroups) cell_count: vec3u,
+    @builtin(local_invocation_index) local: u32,
+) {
+    if (local < MAX_PIECES) {
+        atomicStore(&cell_start[local], 0xffffffffu);
+        atomicStore(&cell_end[local], 0u);
     }
-    let index = pixel_index(pixel.xy);
+    workgroupBarrier();
+    if (all(pixel.xy < view.tile_size)) {
+        cut(pixel_index(pixel.xy));
+    }
+    workgroupBarrier();
+    if (local < MAX_PIECES) {
+        let stride = arrayLength(&cells) / MAX_PIECES;
+        let start = atomicLoad(&cell_start[local]);
+        var range = vec2f(1e30, -1.0);
+        if (start != 0xffffffffu) {
+            range = vec2f(bitcast<f32>(start), bitcast<f32>(atomicLoad(&cell_end[local])));
+        }
+        cells[local * stride + cell.y * cell_count.x + cell.x] = range;
+    }
+}
+
+// The pieces of one pixel.
+fn cut(index: u32) {
     let stride = arrayLength(&pieces) / MAX_PIECES;
     let state = index * STATE;
     var winding = bitcast<i32>(crossings[state + SLOTS]);
@@ -55,6 +84,8 @@ fn segments(@builtin(global_invocation_id) pixel: vec3u) {
             if (t > start) {
                 if (count < MAX_PIECES) {
                     pieces[count * stride + index] = vec4f(start, t, entry, through(index, slot));
+                    atomicMin(&cell_start[count], bitcast<u32>(start));
+                    atomicMax(&cell_end[count], bitcast<u32>(t));
                     count++;
                 } else {
                     dropped++;

@@ -7,6 +7,11 @@ override HETEROGENEOUS: bool = false;   // the medium has a density profile
 @group(1) @binding(1) var<storage, read> sources: array<vec4f>; // v, weight
 @group(1) @binding(2) var<storage, read> piece: array<vec4f>;
 @group(1) @binding(3) var<storage, read> profile: array<vec2f>;
+// Least start and greatest end of the current piece over 8 x 8 pixels: kernels that no ray meets draw nothing.
+@group(1) @binding(4) var<storage, read> cells: array<vec2f>;
+
+const CELL: u32 = 8u;
+const MOST_CELLS: u32 = 64u;
 
 struct Splat {
     @builtin(position) position: vec4f,
@@ -24,16 +29,22 @@ const HEXAGON = array<vec2f, 6>(
     vec2f(1.1547005, 0.0), vec2f(0.57735027, 1.0), vec2f(0.57735027, -1.0),
     vec2f(-0.57735027, 1.0), vec2f(-0.57735027, -1.0), vec2f(-1.1547005, 0.0));
 
-// A corner of a hexagon around the kernel's sphere as the camera sees it, in coordinates along right and up.
+// A kernel's sphere as the camera sees it, in coordinates along the unit axes of the picture at distance 1.
 //
 // A sphere with radius r at distance z along the view and p across it projects to an ellipse whose axes point away
 // from the picture's centre and across: with w = z * z - r * r, middle p z / w, semi-axes r sqrt(p * p + w) / w and
-// r / sqrt(w). A sphere that reaches the camera's plane may be anywhere in the picture.
-fn corner_around(centre: vec3f, radius: f32, corner: u32) -> vec2f {
-    let unit = vec2f(length(view.right), length(view.up)); // of right and up, at distance 1
+// r / sqrt(w).
+struct Outline {
+    middle: vec2f,
+    away: vec2f,
+    axes: vec2f,
+}
+
+fn outline_of(centre: vec3f, radius: f32, unit: vec2f) -> Outline {
     let z = dot(centre, view.forward);
     if (z < 1.05 * radius) {
-        return 4.0 * HEXAGON[corner];
+        // It reaches the camera's plane and may be anywhere in the picture.
+        return Outline(vec2f(0.0), vec2f(1.0, 0.0), 4.0 * unit);
     }
     let across = vec2f(dot(centre, view.right), dot(centre, view.up)) / unit;
     let p = length(across);
@@ -45,8 +56,38 @@ fn corner_around(centre: vec3f, radius: f32, corner: u32) -> vec2f {
     let margin = 0.25 * max(unit.x / f32(view.width), unit.y / f32(view.height));
     let w = z * z - radius * radius;
     let axes = vec2f(radius * sqrt(p * p + w) / w, radius / sqrt(w)) + margin;
-    let at = vec2f(p * z / w, 0.0) + axes * HEXAGON[corner];
-    return (away * at.x + vec2f(-away.y, away.x) * at.y) / unit;
+    return Outline(away * (p * z / w), away, axes);
+}
+
+// Whether the current piece of any pixel under an outline comes within `low`..`high` of the camera, as far as the
+// cells know.
+fn may_meet(outline: Outline, unit: vec2f, low: f32, high: f32) -> bool {
+    let reach = vec2f(length(outline.axes * outline.away), length(outline.axes * outline.away.yx)) / unit;
+    let middle = outline.middle / unit * vec2f(1.0, -1.0);
+    let scale = 0.5 * vec2f(f32(view.width), f32(view.height));
+    let start = vec2f(view.tile_start);
+    let size = vec2f(view.tile_size);
+    // One more pixel on each side for where rays stand in their pixels.
+    let first = max((middle - reach + 1.0) * scale - start - 1.0, vec2f(0.0));
+    let last = min((middle + reach + 1.0) * scale - start + 1.0, size - 1.0);
+    if (any(first > last)) {
+        return false;
+    }
+    let top = vec2u(first) / CELL;
+    let bottom = vec2u(last) / CELL;
+    if ((bottom.x - top.x + 1u) * (bottom.y - top.y + 1u) > MOST_CELLS) {
+        return true;
+    }
+    let columns = (view.tile_size.x + CELL - 1u) / CELL;
+    for (var y = top.y; y <= bottom.y; y++) {
+        for (var x = top.x; x <= bottom.x; x++) {
+            let range = cells[y * columns + x];
+            if (range.x < high && range.y > low) {
+                return true;
+            }
+        }
+    }
+    return false;
 }
 
 @vertex
@@ -57,7 +98,14 @@ fn outline(@builtin(vertex_index) corner: u32, @builtin(instance_index) index: u
     let radius = 1.0001 * CUT_OFF_RADIUS / sample.w;
     var position = vec4f(2.0, 2.0, 0.0, 1.0);
     if (source.w > 0.0 && dot(centre, view.forward) > -radius) {
-        position = tile_clip(corner_around(centre, radius, corner), 1.0);
+        let unit = vec2f(length(view.right), length(view.up));
+        let shape = outline_of(centre, radius, unit);
+        let distance = length(centre);
+        if (may_meet(shape, unit, distance - radius, distance + radius)) {
+            let at = shape.axes * HEXAGON[corner];
+            let turned = shape.away * at.x + vec2f(-shape.away.y, shape.away.x) * at.y;
+            position = tile_clip((shape.middle + turned) / unit, 1.0);
+        }
     }
     position.z = 0.0;
     return Splat(position, vec4f(centre, sample.w), source);

@@ -17,7 +17,7 @@ pub(crate) struct Segments {
 impl Segments {
     pub fn new(device: &Device, common: &BindGroupLayout, asset: &AssetBuffers) -> Self {
         use Slot::{Read, Write};
-        let slots = [Read, Read, Write, Write, Write, Write, Write];
+        let slots = [Read, Read, Write, Write, Write, Write, Write, Write];
         let layout = layout(device, "segments", ShaderStages::COMPUTE, &slots);
         let pipeline_layout = pipeline_layout(device, "segments", common, &layout);
         let module = shaders::module(device, "segments", shaders::SEGMENTS);
@@ -36,6 +36,7 @@ impl Segments {
             &t.radiance,
             &t.counters,
             &t.arguments,
+            &t.cells,
         ];
         group(
             device,

@@ -27,7 +27,7 @@ pub(crate) struct Splat {
 
 impl Splat {
     pub fn new(device: &Device, common: &BindGroupLayout, asset: &AssetBuffers) -> Self {
-        let layout = layout(device, "splat", ShaderStages::VERTEX_FRAGMENT, &[Slot::Read; 4]);
+        let layout = layout(device, "splat", ShaderStages::VERTEX_FRAGMENT, &[Slot::Read; 5]);
         let pipeline_layout = pipeline_layout(device, "splat", common, &layout);
         let module = shaders::module(device, "splat", shaders::SPLAT);
         let constants = [
@@ -75,6 +75,7 @@ impl Splat {
             asset.sources.as_entire_binding(),
             targets.piece(piece),
             targets.profile.as_entire_binding(),
+            targets.piece_cells(piece),
         ];
         group(device, "splat", &self.layout, resources)
     }
