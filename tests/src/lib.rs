@@ -2,8 +2,10 @@
 //!
 //! ```text
 //! mesh, medium, scene ─> reference ─┐
-//! asset, scene ─> play ─────────────┴─> metrics ─> error map, report
+//! asset, scene ─> play ─────────────┴─> metrics ─> report (error map, HTML, JSON)
 //! ```
 
 pub mod metrics;
+pub mod play;
 pub mod reference;
+pub mod report;

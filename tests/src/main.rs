@@ -3,6 +3,7 @@
 mod commands;
 
 use clap::{Parser, Subcommand};
+use commands::output::tell;
 use std::process::ExitCode;
 
 /// Checks translucent assets against a ray-marched reference.
@@ -23,6 +24,10 @@ enum Command {
     Reference(commands::reference::Arguments),
     /// Print how far a picture is from a reference
     Compare(commands::compare::Arguments),
+    /// Play an asset, render the reference, and report how far apart they are
+    Image(commands::image::Arguments),
+    /// Bake, play and check the built-in objects
+    Demo(commands::demo::Arguments),
 }
 
 fn main() -> ExitCode {
@@ -34,19 +39,21 @@ fn main() -> ExitCode {
             return ExitCode::SUCCESS;
         }
         Err(e) => {
-            eprintln!("{}", commands::one_line(&commands::usage_error(&e)));
+            tell(&commands::one_line(&commands::usage_error(&e)));
             return ExitCode::from(2);
         }
     };
     let result = match arguments.command {
         Command::Reference(a) => commands::reference::run(&a),
         Command::Compare(a) => commands::compare::run(&a),
+        Command::Image(a) => commands::image::run(&a),
+        Command::Demo(a) => commands::demo::run(&a),
     };
     match result {
         Ok(true) => ExitCode::SUCCESS,
         Ok(false) => ExitCode::from(1),
         Err(e) => {
-            eprintln!("error: {}", commands::one_line(&format!("{e:#}")));
+            tell(&format!("error: {}", commands::one_line(&format!("{e:#}"))));
             ExitCode::from(2)
         }
     }

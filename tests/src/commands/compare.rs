@@ -1,5 +1,6 @@
 //! `diaphane-validate compare`.
 
+use super::output::say;
 use diaphane_formats::picture::{self, Picture};
 use std::path::{Path, PathBuf};
 use validation::metrics::{Metrics, compare};
@@ -35,22 +36,22 @@ pub fn run(a: &Arguments) -> anyhow::Result<bool> {
     if a.json {
         let mut value = serde_json::to_value(metrics)?;
         value["coverage"] = source.into();
-        println!("{}", serde_json::to_string_pretty(&value)?);
+        say(&serde_json::to_string_pretty(&value)?);
     } else {
         print_metrics(&metrics);
-        println!("coverage   {source}");
+        say(&format!("coverage   {source}"));
     }
     Ok(metrics.non_finite == 0)
 }
 
 /// The metrics as a small table.
 pub fn print_metrics(m: &Metrics) {
-    println!("rel_rmse   {:.5}", m.rel_rmse);
-    println!("psnr_db    {:.2}", m.psnr_db);
-    println!("bias       {:+.5}", m.bias);
-    println!("p99_rel    {:.5}", m.p99_rel);
-    println!("non_finite {}", m.non_finite);
-    println!("pixels     {}", m.pixels);
+    say(&format!("rel_rmse   {:.5}", m.rel_rmse));
+    say(&format!("psnr_db    {:.2}", m.psnr_db));
+    say(&format!("bias       {:+.5}", m.bias));
+    say(&format!("p99_rel    {:.5}", m.p99_rel));
+    say(&format!("non_finite {}", m.non_finite));
+    say(&format!("pixels     {}", m.pixels));
 }
 
 /// The mask and where it comes from.

@@ -1,6 +1,9 @@
 //! One module for each command; each returns whether its checks passed, or the error that ends the program with 2.
 
 pub mod compare;
+pub mod demo;
+pub mod image;
+pub mod output;
 pub mod progress;
 pub mod reference;
 

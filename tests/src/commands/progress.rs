@@ -1,5 +1,6 @@
 //! Progress on standard error: a bar on a terminal, plain lines otherwise.
 
+use super::output::tell;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::IsTerminal;
 use validation::reference::Progress;
@@ -44,18 +45,16 @@ impl Display {
                 bar.set_message(message);
             }
             None if p.pass > 0 && self.printed.swap(p.pass, Ordering::Relaxed) != p.pass => {
-                eprintln!("{}: {message}, {} pixels", self.label, p.total);
+                tell(&format!("{}: {message}, {} pixels", self.label, p.total));
             }
             None => {}
         }
     }
 
-    /// A share 0..1 of a named stage.
-    pub fn stage(&self, stage: &str, share: f64) {
-        if let Some(bar) = &self.bar {
-            bar.set_length(1000);
-            bar.set_position((1000.0 * share) as u64);
-            bar.set_message(stage.to_owned());
+    /// Says once, where there is no bar, that the work begins.
+    pub fn announce(&self) {
+        if self.bar.is_none() {
+            tell(&format!("{} ...", self.label));
         }
     }
 
@@ -64,5 +63,25 @@ impl Display {
         if let Some(bar) = &self.bar {
             bar.finish_and_clear();
         }
+    }
+}
+
+impl diaphane_bake::progress::Progress for Display {
+    fn stage(&self, name: &'static str, total: u64) {
+        if let Some(bar) = &self.bar {
+            bar.set_length(total.max(1));
+            bar.set_position(0);
+            bar.set_message(name);
+        }
+    }
+
+    fn advance(&self, units: u64) {
+        if let Some(bar) = &self.bar {
+            bar.inc(units);
+        }
+    }
+
+    fn cancelled(&self) -> bool {
+        false
     }
 }

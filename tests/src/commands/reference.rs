@@ -1,11 +1,12 @@
 //! `diaphane-validate reference`.
 
 use super::Inputs;
+use super::output::{say, tell, warn};
 use super::progress::Display;
 use diaphane_formats::{files, picture};
 use std::path::PathBuf;
 use std::time::Instant;
-use validation::reference::{Reference, Settings, render};
+use validation::reference::{Settings, render};
 
 /// What to render and how well.
 #[derive(clap::Args)]
@@ -44,9 +45,7 @@ pub fn run(a: &Arguments) -> anyhow::Result<bool> {
     let loaded = a.inputs.load()?;
     a.inputs.require_different(&a.output)?;
     files::require_writable(&a.output)?;
-    for line in &loaded.warnings {
-        eprintln!("warning: {line}");
-    }
+    warn(&loaded.warnings);
     let settings = Settings {
         tolerance: a.tolerance,
         seed: a.seed,
@@ -59,25 +58,18 @@ pub fn run(a: &Arguments) -> anyhow::Result<bool> {
     })?;
     display.finish();
     picture::write_exr(&a.output, &reference.picture)?;
-    let Reference {
-        picture,
-        error,
-        converged,
-        rays,
-    } = &reference;
-    println!(
+    let picture = &reference.picture;
+    say(&format!(
         "{}: {} x {}, noise {:.3} %, {:.1} million rays, {:.1} s",
         a.output.display(),
         picture.width,
         picture.height,
-        100.0 * error,
-        *rays as f64 * 1e-6,
+        100.0 * reference.error,
+        reference.rays as f64 * 1e-6,
         start.elapsed().as_secs_f64()
-    );
-    if !converged {
-        eprintln!(
-            "warning: the noise is above the tolerance although every pixel has all samples it may have"
-        );
+    ));
+    if !reference.converged {
+        tell("check failed: the noise is above the tolerance although every pixel has all its samples");
     }
-    Ok(*converged)
+    Ok(reference.converged)
 }
