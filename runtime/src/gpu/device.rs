@@ -8,9 +8,12 @@ use wgpu::{
 };
 
 /// A device with its queue, and the complaints that reached nobody else.
-pub(super) struct OwnedDevice {
+pub struct GpuDevice {
+    /// The device.
     pub device: Device,
+    /// Its queue.
     pub queue: Queue,
+    /// Where it comes from.
     pub adapter: Adapter,
     faults: Faults,
 }
@@ -21,7 +24,7 @@ struct Faults(Arc<Mutex<Option<String>>>);
 
 impl Faults {
     fn report(&self, message: String) {
-        log::error!("{message}");
+        log::debug!("{message}");
         self.0
             .lock()
             .unwrap_or_else(PoisonError::into_inner)
@@ -43,15 +46,15 @@ const NEEDED_FLAGS: DownlevelFlags = DownlevelFlags::COMPUTE_SHADERS
     .union(DownlevelFlags::INDIRECT_EXECUTION);
 
 /// An instance with all backends of this platform; the environment variables that wgpu knows apply.
-pub(super) fn instance() -> Instance {
+pub fn instance() -> Instance {
     Instance::new(InstanceDescriptor::new_without_display_handle().with_env())
 }
 
-impl OwnedDevice {
+impl GpuDevice {
     /// The best adapter that can draw, hardware before software, and able to show on `surface` if one is given.
     ///
     /// # Errors
-    /// [`Error::NoAdapter`] that says what was found and what it lacks.
+    /// [`Error::NoAdapter`], which says what was found and what it lacks.
     pub fn open(instance: &Instance, surface: Option<&Surface<'_>>) -> Result<Self> {
         let mut adapters = pollster::block_on(instance.enumerate_adapters(Backends::all()));
         if adapters.is_empty() {
@@ -97,18 +100,22 @@ impl OwnedDevice {
         })
     }
 
-    /// The adapter's name, and its driver where it says.
+    /// The adapter's name, its backend, and whether it is software.
     pub fn describe(&self) -> String {
         let info = self.adapter.get_info();
-        let software = if info.device_type == DeviceType::Cpu {
-            ", software"
-        } else {
-            ""
-        };
+        let software = if self.is_software() { ", software" } else { "" };
         format!("{} ({}{software})", info.name, info.backend)
     }
 
+    /// Whether the adapter is a program itself.
+    pub fn is_software(&self) -> bool {
+        self.adapter.get_info().device_type == DeviceType::Cpu
+    }
+
     /// The first complaint since the last call, as an error.
+    ///
+    /// # Errors
+    /// What the driver said, or that the device was lost.
     pub fn check(&self) -> Result<()> {
         self.faults
             .take()

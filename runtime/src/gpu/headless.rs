@@ -1,8 +1,8 @@
 //! A renderer that owns its device and reads its pictures back.
 
-use super::bindings::empty_buffer;
-use super::device::{OwnedDevice, instance};
-use super::renderer::Renderer;
+use super::device::{GpuDevice, instance};
+use super::pipeline::Pipeline;
+use super::readback;
 use super::targets::Targets;
 use super::tiles::Tile;
 use super::timers::{Pass, Timers};
@@ -13,14 +13,13 @@ use crate::{Error, Result};
 use diaphane_formats::asset::Asset;
 use diaphane_formats::directions::subpixel_offsets;
 use diaphane_formats::picture::Picture;
-use std::sync::mpsc;
 use std::time::Instant;
-use wgpu::{Buffer, BufferUsages, CommandEncoder, MapMode, PollType};
+use wgpu::{Buffer, CommandEncoder};
 
 /// Draws frames of one asset on the GPU, or on a software adapter where that is all there is.
 pub struct GpuRenderer {
-    owned: OwnedDevice,
-    renderer: Renderer,
+    owned: GpuDevice,
+    renderer: Pipeline,
     timers: Timers,
     name: String,
     tiles: usize,
@@ -32,8 +31,8 @@ impl GpuRenderer {
     /// # Errors
     /// [`Error::NoAdapter`] without a usable adapter; an asset that makes no sense or does not fit.
     pub fn new(asset: &Asset) -> Result<Self> {
-        let owned = OwnedDevice::open(&instance(), None)?;
-        let renderer = Renderer::new(&owned.device, asset)?;
+        let owned = GpuDevice::open(&instance(), None)?;
+        let renderer = Pipeline::new(&owned.device, asset)?;
         owned.check()?;
         let timers = Timers::new(&owned.device, &owned.queue, 1);
         let name = owned.describe();
@@ -84,11 +83,7 @@ impl GpuRenderer {
             }
         })?;
         picture.coverage = Some(coverage);
-        let mut passes: Vec<(&'static str, f64)> = Pass::ALL
-            .into_iter()
-            .filter(|p| milliseconds[*p as usize] > 0.0)
-            .map(|p| (p.name(), milliseconds[p as usize]))
-            .collect();
+        let mut passes = Pass::named(&milliseconds);
         if passes.is_empty() {
             passes.push(("frame", started.elapsed().as_secs_f64() * 1e3));
         }
@@ -140,7 +135,7 @@ impl GpuRenderer {
         offsets: &[[f32; 2]],
         mut take: impl FnMut(Tile, TileData),
     ) -> Result<[f64; 7]> {
-        let OwnedDevice { device, queue, .. } = &self.owned;
+        let GpuDevice { device, queue, .. } = &self.owned;
         let tiles = self.renderer.begin(device, queue, frame, exact)?;
         self.tiles = tiles.len();
         let submissions = offsets.len() as u64 + 1;
@@ -149,7 +144,8 @@ impl GpuRenderer {
         }
         let mut milliseconds = [0.0; 7];
         for (t, &tile) in tiles.iter().enumerate() {
-            self.renderer.write_views(device, queue, frame, &[tile], offsets);
+            self.renderer
+                .write_views(device, queue, frame, &[tile], offsets, 0);
             self.timers.restart();
             // One submission for each ray keeps every one short, whatever the adapter's patience.
             let submit = |timers: &mut Timers, record: &dyn Fn(&mut CommandEncoder, &mut Timers)| {
@@ -193,15 +189,16 @@ impl GpuRenderer {
             (&targets.pieces, targets.pieces.size()),
         ];
         sources.extend(self.timers.buffer());
-        let copies = self.copy_back(&sources)?;
+        let copies = readback::buffers(&self.owned.device, &self.owned.queue, &sources)?;
+        self.owned.check()?;
         let view = |i: usize| {
             copies[i]
                 .get_mapped_range(..)
                 .map_err(|e| Error::Gpu(format!("cannot read the picture back: {e}")))
         };
         let (radiance, counters, pieces) = (view(0)?, view(1)?, view(2)?);
-        if copies.len() > 3 {
-            self.timers.sum(&view(3)?, milliseconds);
+        if let Some(reading) = self.timers.reading() {
+            reading.sum(&view(3)?, milliseconds);
         }
         take(
             tile,
@@ -213,41 +210,6 @@ impl GpuRenderer {
             },
         );
         Ok(())
-    }
-
-    /// Copies of buffers that the program can read, once everything submitted is done.
-    fn copy_back(&self, sources: &[(&Buffer, u64)]) -> Result<Vec<Buffer>> {
-        let OwnedDevice { device, queue, .. } = &self.owned;
-        let mut encoder = device.create_command_encoder(&Default::default());
-        let copies: Vec<Buffer> = sources
-            .iter()
-            .map(|(source, size)| {
-                let copy = empty_buffer(
-                    device,
-                    "copy",
-                    *size,
-                    BufferUsages::MAP_READ | BufferUsages::COPY_DST,
-                );
-                encoder.copy_buffer_to_buffer(source, 0, &copy, 0, *size);
-                copy
-            })
-            .collect();
-        queue.submit([encoder.finish()]);
-        let (done, results) = mpsc::channel();
-        for copy in &copies {
-            let done = done.clone();
-            // Nobody listens any more only when an earlier copy failed already.
-            copy.map_async(MapMode::Read, .., move |result| drop(done.send(result)));
-        }
-        device
-            .poll(PollType::wait_indefinitely())
-            .map_err(|e| Error::Gpu(e.to_string()))?;
-        self.owned.check()?;
-        for _ in &copies {
-            let failed = || Error::Gpu("the picture could not be read back".to_owned());
-            results.try_recv().map_err(|_| failed())?.map_err(|_| failed())?;
-        }
-        Ok(copies)
     }
 }
 

@@ -7,7 +7,7 @@
 //! ```
 //!
 //! [`GpuRenderer`] owns its device and reads pictures back; [`Renderer`] records the same passes into a host's command
-//! buffer. Boundary runs where `ior` is not 1, profile where the medium has a density grid. Later pieces of rays are
+//! buffer, with two more for the screen: publish (mean of the rays so far) and display (exposure). Boundary runs where `ior` is not 1, profile where the medium has a density grid. Later pieces of rays are
 //! drawn indirectly and cost next to nothing where no ray has them. Sums are kept in 32-bit floats and blended in the
 //! order of the samples: the same adapter draws the same bits every time.
 
@@ -16,6 +16,8 @@ mod device;
 mod headless;
 mod neighbours;
 mod passes;
+mod pipeline;
+mod readback;
 mod renderer;
 mod scene;
 mod shaders;
@@ -24,5 +26,7 @@ mod tiles;
 mod timers;
 mod uniforms;
 
+pub use device::{GpuDevice, instance};
 pub use headless::GpuRenderer;
-pub use renderer::Renderer;
+pub use readback::texture as read_texture;
+pub use renderer::{Renderer, Request, Statistics};

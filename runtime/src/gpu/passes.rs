@@ -1,8 +1,10 @@
 //! The passes: pipelines, and the commands of each.
 
 pub(super) mod boundary;
+pub(super) mod display;
 pub(super) mod lighting;
 pub(super) mod profile;
+pub(super) mod publish;
 pub(super) mod resolve;
 pub(super) mod segments;
 pub(super) mod splat;

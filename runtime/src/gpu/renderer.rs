@@ -1,200 +1,326 @@
-//! The passes of a frame, recorded into anybody's command buffer.
+//! The renderer for programs that own device and window: it records into their command buffer and draws into their
+//! render pass.
 
 use super::passes::Recorder;
-use super::passes::boundary::Boundary;
-use super::passes::lighting::Lighting;
-use super::passes::profile::Profile;
-use super::passes::resolve::Resolve;
-use super::passes::segments::Segments;
-use super::passes::splat::Splat;
-use super::passes::surface::Surface;
-use super::scene::{AssetBuffers, FrameBuffers, VIEW_STRIDE, common_layout};
-use super::targets::{Targets, budget};
-use super::tiles::{Tile, split};
-use super::timers::Timers;
-use super::uniforms::ViewUniform;
-use crate::Result;
+use super::passes::display::Display;
+use super::passes::publish::Publish;
+use super::pipeline::Pipeline;
+use super::readback;
+use super::targets::SUM_FORMAT;
+use super::timers::{Pass, Reading, Timers};
 use crate::exact::ExactDepths;
 use crate::frame::Frame;
-use crate::rendered::MAX_PIECES;
+use crate::rendered::Counters;
+use crate::{Error, Result};
 use diaphane_formats::asset::Asset;
-use wgpu::{BindGroup, BindGroupLayout, CommandEncoder, Device, Queue};
+use diaphane_formats::directions::subpixel_offsets;
+use diaphane_formats::picture::Picture;
+use std::ops::Range;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU32, Ordering};
+use wgpu::{
+    BindGroup, Buffer, CommandEncoder, Device, Extent3d, MapMode, Queue, RenderPass, Texture,
+    TextureDescriptor, TextureDimension, TextureFormat, TextureUsages, TextureView,
+};
 
-/// Draws one asset with a device that somebody else owns.
+/// What a picture is made of and how it is shown.
+pub struct Request<'a> {
+    /// Camera, lights, size.
+    pub frame: &'a Frame,
+    /// Exact depths for some of the lights.
+    pub exact: Option<&'a ExactDepths>,
+    /// Which of the frame's rays to draw now: a range from 0 begins a new picture, the next ones refine it. A picture
+    /// of several tiles is begun anew every time.
+    pub rays: Range<u32>,
+    /// Factor on the radiance for display.
+    pub exposure: f32,
+}
+
+/// Times of passes (milliseconds, one ray) and counts of a picture drawn a while ago.
+#[derive(Clone, Debug, Default)]
+pub struct Statistics {
+    /// As in [`crate::rendered::Rendered`]; empty where the adapter has no clock.
+    pub passes: Vec<(&'static str, f64)>,
+    /// Sums over the rays so far.
+    pub counters: Counters,
+}
+
+/// Draws one asset with a device that somebody else owns, which needs `FLOAT32_BLENDABLE`.
 pub struct Renderer {
-    common: BindGroupLayout,
-    lighting: Lighting,
-    surface: Surface,
-    boundary: Option<Boundary>,
-    segments: Segments,
-    profile: Option<Profile>,
-    splat: Splat,
-    resolve: Resolve,
-    pub(super) asset: AssetBuffers,
-    frame: FrameBuffers,
-    targets: Option<(Targets, Groups)>,
+    passes: Pipeline,
+    publish: Publish,
+    display: Display,
+    picture: Option<Shown>,
+    timers: Timers,
+    pending: Option<Pending>,
+    statistics: Statistics,
+    tiles: usize,
 }
 
-/// The groups of all passes.
-struct Groups {
-    lighting: BindGroup,
-    surface: BindGroup,
-    boundary: Option<BindGroup>,
-    segments: BindGroup,
-    pieces: Vec<PieceGroups>,
+/// The picture that is shown.
+struct Shown {
+    texture: Texture,
+    view: TextureView,
+    group: BindGroup,
 }
 
-struct PieceGroups {
-    profile: Option<BindGroup>,
-    splat: BindGroup,
-    resolve: BindGroup,
+/// Numbers on their way back.
+struct Pending {
+    counters: Buffer,
+    timers: Option<(Buffer, Reading)>,
+    /// Copies that arrived; `FAILED` when one did not.
+    arrived: Option<Arc<AtomicU32>>,
+    rays: u64,
 }
+
+const FAILED: u32 = 1 << 16;
 
 impl Renderer {
-    /// Compiles the passes and uploads an asset. The device needs `FLOAT32_BLENDABLE`.
+    /// Compiles the passes for targets of a format, and uploads an asset.
     ///
     /// # Errors
     /// An asset that makes no sense or is too large for the device.
-    pub fn new(device: &Device, asset: &Asset) -> Result<Self> {
-        let common = common_layout(device);
-        let asset = AssetBuffers::new(device, asset)?;
+    pub fn new(device: &Device, queue: &Queue, asset: &Asset, target: TextureFormat) -> Result<Self> {
+        let passes = Pipeline::new(device, asset)?;
         Ok(Self {
-            lighting: Lighting::new(device, &common, &asset),
-            surface: Surface::new(device, &common),
-            boundary: asset.fresnel.then(|| Boundary::new(device, &common)),
-            segments: Segments::new(device, &common, &asset),
-            profile: asset.heterogeneous.then(|| Profile::new(device, &common)),
-            splat: Splat::new(device, &common, &asset),
-            resolve: Resolve::new(device, &common, &asset),
-            frame: FrameBuffers::new(device, &common, &asset),
-            common,
-            asset,
-            targets: None,
+            publish: Publish::new(device, passes.common_layout()),
+            display: Display::new(device, target),
+            picture: None,
+            timers: Timers::new(device, queue, 1),
+            pending: None,
+            statistics: Statistics::default(),
+            tiles: 0,
+            passes,
         })
     }
 
-    /// Uploads a frame's lights, and sees that there are targets for its tiles, which it returns.
-    pub(super) fn begin(
+    /// Records rays of a picture. [`Self::render`] then shows the mean of all rays so far.
+    ///
+    /// # Errors
+    /// The picture or its lights are too large for the device.
+    pub fn prepare(
         &mut self,
         device: &Device,
         queue: &Queue,
-        frame: &Frame,
-        exact: Option<&ExactDepths>,
-    ) -> Result<Vec<Tile>> {
-        self.frame
-            .write_lights(device, queue, &self.asset, frame, exact)?;
-        let tiles = split(frame.width, frame.height, budget(device, &self.asset))?;
-        // The first tile is the largest; `split` returns at least one.
-        let fits = self
-            .targets
-            .as_ref()
-            .is_some_and(|(t, _)| t.size == tiles[0].size);
-        if !fits || self.frame.take_changed() {
-            let old = self.targets.take().map(|(t, _)| t).filter(|_| fits);
-            let targets = old.unwrap_or_else(|| Targets::new(device, &self.asset, tiles[0]));
-            let groups = self.groups(device, &targets);
-            self.targets = Some((targets, groups));
+        encoder: &mut CommandEncoder,
+        request: &Request,
+    ) -> Result<()> {
+        let frame = request.frame;
+        let side = device.limits().max_texture_dimension_2d;
+        if frame.width.max(frame.height) > side {
+            return Err(Error::Gpu(format!(
+                "the picture is larger than the adapter's {side} pixels"
+            )));
         }
-        Ok(tiles)
-    }
-
-    /// Uploads the rays of some tiles: view `t * offsets.len() + o` is offset o in tile t.
-    pub(super) fn write_views(
-        &mut self,
-        device: &Device,
-        queue: &Queue,
-        frame: &Frame,
-        tiles: &[Tile],
-        offsets: &[[f32; 2]],
-    ) {
-        let mut views = Vec::with_capacity(tiles.len() * offsets.len());
-        for &tile in tiles {
-            views.extend(
-                offsets
-                    .iter()
-                    .map(|&o| ViewUniform::new(frame, self.asset.diagonal, tile, o)),
+        let tiles = self.passes.begin(device, queue, frame, request.exact)?;
+        self.tiles = tiles.len();
+        let first = if tiles.len() > 1 { 0 } else { request.rays.start };
+        let offsets = scattered_offsets(frame.samples_per_pixel);
+        let offsets =
+            &offsets[first as usize..(request.rays.end as usize).clamp(first as usize, offsets.len())];
+        self.passes
+            .write_views(device, queue, frame, &tiles, offsets, first);
+        self.timers.restart();
+        self.display.write(queue, request.exposure);
+        self.fit_picture(device, frame.width, frame.height);
+        let Some(shown) = &self.picture else { return Ok(()) };
+        let timers = &mut self.timers;
+        if first == 0 {
+            self.passes.record_lighting(encoder, timers);
+        }
+        for (t, &tile) in tiles.iter().enumerate() {
+            if first == 0 {
+                self.passes.record_start(encoder);
+            }
+            let views = t * offsets.len()..(t + 1) * offsets.len();
+            for view in views.clone() {
+                self.passes.record_ray(encoder, timers, view, tile);
+            }
+            // The last view knows how many rays the picture has now.
+            if let (Some(view), Some(targets)) = (views.last(), self.passes.targets()) {
+                let group = self.publish.bind(device, targets);
+                let mut recorder: Recorder = self.passes.recorder(encoder, timers, view, tile);
+                self.publish.record(&mut recorder, &group, tile, &shown.view);
+            }
+        }
+        timers.close(encoder);
+        if self.pending.is_none() && tiles.len() == 1 {
+            let rays = u64::from(first) + offsets.len() as u64;
+            self.ask(
+                device,
+                encoder,
+                rays * u64::from(frame.width) * u64::from(frame.height),
             );
         }
-        self.frame
-            .write_views(device, queue, &self.common, &self.asset, &views);
+        Ok(())
     }
 
-    /// The targets of the frame that was begun.
-    pub(super) fn targets(&self) -> Option<&Targets> {
-        self.targets.as_ref().map(|(t, _)| t)
-    }
-
-    /// Records the lighting of all samples.
-    pub(super) fn record_lighting(&self, encoder: &mut CommandEncoder, timers: &mut Timers) {
-        let Some((_, groups)) = &self.targets else { return };
-        if self.asset.sample_count > 0 {
-            let mut r = Recorder {
-                encoder,
-                timers,
-                common: self.frame.common(),
-                view_offset: 0,
-                tile: [0; 2],
-            };
-            self.lighting.record(&mut r, &groups.lighting, &self.asset);
+    /// Fills the pass's viewport with the picture.
+    pub fn render(&self, pass: &mut RenderPass<'_>) {
+        if let Some(shown) = &self.picture {
+            self.display.draw(pass, &shown.group);
         }
     }
 
-    /// Records the start of a tile: an empty picture.
-    pub(super) fn record_start(&self, encoder: &mut CommandEncoder) {
-        let Some((targets, _)) = &self.targets else { return };
-        encoder.clear_buffer(&targets.radiance, 0, None);
-        encoder.clear_buffer(&targets.counters, 0, None);
+    /// Tiles of the last picture; a picture of several cannot be refined ray by ray.
+    pub fn tiles(&self) -> usize {
+        self.tiles
     }
 
-    /// Records one ray of every pixel of a tile, added to the picture.
-    pub(super) fn record_ray(
-        &self,
-        encoder: &mut CommandEncoder,
-        timers: &mut Timers,
-        view: usize,
-        tile: Tile,
-    ) {
-        let Some((targets, groups)) = &self.targets else {
+    /// Reads the picture back: radiance, and coverage. Waits for the device.
+    ///
+    /// # Errors
+    /// The device failed, or nothing was drawn yet.
+    pub fn read_picture(&self, device: &Device, queue: &Queue) -> Result<Picture> {
+        let shown = self
+            .picture
+            .as_ref()
+            .ok_or_else(|| Error::Gpu("nothing was drawn yet".to_owned()))?;
+        let bytes = readback::texture(device, queue, &shown.texture)?;
+        let texels: Vec<[f32; 4]> = bytes.chunks_exact(16).map(bytemuck::pod_read_unaligned).collect();
+        let mut picture = Picture::new(shown.texture.width() as usize, shown.texture.height() as usize);
+        for (pixel, [r, g, b, _]) in picture.pixels.iter_mut().zip(&texels) {
+            *pixel = [*r, *g, *b];
+        }
+        picture.coverage = Some(texels.iter().map(|t| t[3]).collect());
+        Ok(picture)
+    }
+
+    /// The latest numbers that came back. Call it after submitting, once a frame: it never waits.
+    pub fn statistics(&mut self) -> &Statistics {
+        let Some(pending) = &mut self.pending else {
+            return &self.statistics;
+        };
+        let copies = || std::iter::once(&pending.counters).chain(pending.timers.as_ref().map(|(b, _)| b));
+        match &pending.arrived {
+            None => {
+                let arrived = Arc::new(AtomicU32::new(0));
+                for copy in copies() {
+                    let arrived = Arc::clone(&arrived);
+                    copy.map_async(MapMode::Read, .., move |result| {
+                        arrived.fetch_add(if result.is_ok() { 1 } else { FAILED }, Ordering::AcqRel);
+                    });
+                }
+                pending.arrived = Some(arrived);
+            }
+            Some(arrived) => {
+                let count = arrived.load(Ordering::Acquire);
+                if count >= FAILED {
+                    self.pending = None;
+                } else if count as usize == copies().count() {
+                    self.take_numbers();
+                }
+            }
+        }
+        &self.statistics
+    }
+
+    fn take_numbers(&mut self) {
+        let Some(pending) = self.pending.take() else {
             return;
         };
-        let view_offset = (view as u64 * VIEW_STRIDE) as u32;
-        let r = &mut Recorder {
-            encoder,
-            timers,
-            common: self.frame.common(),
-            view_offset,
-            tile: tile.size,
+        let samples_drawn = self.passes.asset.samples_drawn;
+        let mut counters = Counters {
+            rays: pending.rays,
+            samples_drawn,
+            ..Counters::default()
         };
-        self.surface.record(r, &groups.surface, &self.asset, targets);
-        if let (Some(boundary), Some(group)) = (&self.boundary, &groups.boundary) {
-            boundary.record(r, group, &self.asset, targets);
-        }
-        self.segments.record(r, &groups.segments, targets);
-        for (k, piece) in groups.pieces.iter().enumerate() {
-            if let (Some(profile), Some(group)) = (&self.profile, &piece.profile) {
-                profile.record(r, group, targets, k);
+        if let Ok(view) = pending.counters.get_mapped_range(..) {
+            for [hit, dropped, splats, uncovered] in view
+                .chunks_exact(16)
+                .map(bytemuck::pod_read_unaligned::<[u32; 4]>)
+            {
+                counters.rays_hit += u64::from(hit);
+                counters.pieces_dropped += u64::from(dropped);
+                counters.splats += u64::from(splats);
+                counters.uncovered += u64::from(uncovered);
             }
-            self.splat.record(r, &piece.splat, targets, k);
-            self.resolve.record(r, &piece.resolve, targets, k);
+            self.statistics.counters = counters;
+        }
+        if let Some((buffer, reading)) = &pending.timers
+            && let Ok(view) = buffer.get_mapped_range(..)
+        {
+            let mut milliseconds = [0.0; 7];
+            reading.sum(&view, &mut milliseconds);
+            self.statistics.passes = Pass::named(&milliseconds);
         }
     }
 
-    fn groups(&self, device: &Device, targets: &Targets) -> Groups {
-        let (asset, frame) = (&self.asset, &self.frame);
-        let piece = |k: usize| PieceGroups {
-            profile: self.profile.as_ref().map(|p| p.bind(device, asset, targets, k)),
-            splat: self.splat.bind(device, asset, targets, k),
-            resolve: self.resolve.bind(device, targets, k),
+    /// Records copies of counters and times.
+    fn ask(&mut self, device: &Device, encoder: &mut CommandEncoder, rays: u64) {
+        let Some(targets) = self.passes.targets() else {
+            return;
         };
-        Groups {
-            lighting: self.lighting.bind(device, asset, frame),
-            surface: self.surface.bind(device, asset, targets),
-            boundary: self
-                .boundary
-                .as_ref()
-                .map(|b| b.bind(device, asset, frame, targets)),
-            segments: self.segments.bind(device, targets),
-            pieces: (0..MAX_PIECES).map(piece).collect(),
+        let size = 16 * u64::from(targets.size[0]) * u64::from(targets.size[1]);
+        let times = self.timers.buffer();
+        let times = times.map(|(buffer, size)| readback::copy(device, encoder, buffer, size));
+        self.pending = Some(Pending {
+            counters: readback::copy(device, encoder, &targets.counters, size),
+            timers: times.zip(self.timers.reading()),
+            arrived: None,
+            rays,
+        });
+    }
+
+    fn fit_picture(&mut self, device: &Device, width: u32, height: u32) {
+        if self
+            .picture
+            .as_ref()
+            .is_some_and(|s| s.texture.width() == width && s.texture.height() == height)
+        {
+            return;
+        }
+        let texture = device.create_texture(&TextureDescriptor {
+            label: Some("picture"),
+            size: Extent3d {
+                width,
+                height,
+                depth_or_array_layers: 1,
+            },
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: TextureDimension::D2,
+            format: SUM_FORMAT,
+            usage: TextureUsages::RENDER_ATTACHMENT
+                | TextureUsages::TEXTURE_BINDING
+                | TextureUsages::COPY_SRC,
+            view_formats: &[],
+        });
+        let view = texture.create_view(&Default::default());
+        let group = self.display.bind(device, &view);
+        self.picture = Some(Shown { texture, view, group });
+    }
+}
+
+/// The positions of [`subpixel_offsets`] in an order whose first few are spread over the pixel already.
+fn scattered_offsets(count: u32) -> Vec<[f32; 2]> {
+    let offsets = subpixel_offsets(count as usize);
+    let gcd = |mut a: usize, mut b: usize| {
+        while b > 0 {
+            (a, b) = (b, a % b);
+        }
+        a
+    };
+    // Steps of about the golden section, without a common divisor, meet every position once.
+    let n = offsets.len();
+    let step = (n * 382 / 1000..=n)
+        .find(|&s| s > 0 && gcd(s, n) == 1)
+        .unwrap_or(1);
+    (0..n).map(|i| offsets[(i + 1) * step % n]).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_position_once() {
+        for count in 1..70 {
+            let mut scattered = scattered_offsets(count);
+            let mut plain = subpixel_offsets(count as usize);
+            scattered.sort_by(|a, b| a.partial_cmp(b).unwrap());
+            plain.sort_by(|a, b| a.partial_cmp(b).unwrap());
+            assert_eq!(scattered, plain, "{count}");
         }
     }
 }

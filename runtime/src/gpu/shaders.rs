@@ -40,6 +40,9 @@ pub(super) const RESOLVE: &str = source!(
     "resolve"
 );
 
+pub(super) const PUBLISH: &str = source!("shared/view", "publish");
+pub(super) const DISPLAY: &str = source!("display");
+
 /// Compiles a shader.
 pub(super) fn module(device: &Device, label: &str, source: &'static str) -> ShaderModule {
     device.create_shader_module(ShaderModuleDescriptor {

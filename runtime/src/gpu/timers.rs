@@ -29,6 +29,15 @@ impl Pass {
         Self::Resolve,
     ];
 
+    /// Names and milliseconds of the passes that ran.
+    pub fn named(milliseconds: &[f64; 7]) -> Vec<(&'static str, f64)> {
+        let times = Self::ALL.into_iter().zip(milliseconds);
+        times
+            .filter(|(_, ms)| **ms > 0.0)
+            .map(|(pass, ms)| (pass.name(), *ms))
+            .collect()
+    }
+
     pub fn name(self) -> &'static str {
         match self {
             Self::Lighting => "lighting",
@@ -135,18 +144,29 @@ impl Timers {
         ))
     }
 
-    /// Adds up the read-back ticks: milliseconds by pass, in the order of [`Pass::ALL`].
+    /// How to read what [`Self::buffer`] holds now, also when later frames have begun; `None` without a clock.
+    pub fn reading(&self) -> Option<Reading> {
+        self.0.as_ref().map(|c| Reading {
+            period: c.period,
+            passes: c.passes.clone(),
+        })
+    }
+}
+
+/// Which passes the ticks in a copy of the buffer belong to.
+pub(super) struct Reading {
+    period: f64,
+    passes: Vec<Vec<Pass>>,
+}
+
+impl Reading {
+    /// Adds up ticks: milliseconds by pass, in the order of [`Pass::ALL`].
     pub fn sum(&self, bytes: &[u8], milliseconds: &mut [f64; 7]) {
-        let Some(clock) = &self.0 else { return };
-        for (passes, block) in clock.passes.iter().zip(bytes.chunks_exact(BLOCK as usize)) {
-            let tick = |i: usize| {
-                let mut word = [0; 8];
-                word.copy_from_slice(&block[8 * i..8 * i + 8]);
-                u64::from_le_bytes(word)
-            };
+        for (passes, block) in self.passes.iter().zip(bytes.chunks_exact(BLOCK as usize)) {
+            let tick = |i: usize| bytemuck::pod_read_unaligned::<u64>(&block[8 * i..8 * i + 8]);
             for (i, pass) in passes.iter().enumerate() {
                 let ticks = tick(2 * i + 1).saturating_sub(tick(2 * i));
-                milliseconds[*pass as usize] += ticks as f64 * clock.period * 1e-6;
+                milliseconds[*pass as usize] += ticks as f64 * self.period * 1e-6;
             }
         }
     }

@@ -34,12 +34,13 @@ pub(super) struct ViewUniform {
     pub least_distance: f32,
     pub specular: f32,
     pub alpha: f32,
-    pub unused: [u32; 2],
+    pub rays: u32,
+    pub unused: u32,
 }
 
 impl ViewUniform {
-    /// A frame's rays at `offset` inside the pixels of `tile`.
-    pub fn new(frame: &Frame, diagonal: f32, tile: Tile, offset: [f32; 2]) -> Self {
+    /// A frame's rays at `offset` inside the pixels of `tile`, which then hold `rays` rays.
+    pub fn new(frame: &Frame, diagonal: f32, tile: Tile, offset: [f32; 2], rays: u32) -> Self {
         let surface = &frame.surface;
         Self {
             origin: frame.view.origin,
@@ -63,7 +64,8 @@ impl ViewUniform {
             alpha: (surface.roughness as f32)
                 .max(crate::cpu::surface::LEAST_ROUGHNESS)
                 .powi(2),
-            unused: [0; 2],
+            rays,
+            unused: 0,
         }
     }
 }
@@ -225,7 +227,8 @@ mod tests {
             near,
             least_distance,
             specular,
-            alpha
+            alpha,
+            rays
         );
         mirrors!(
             MediumUniform,

@@ -11,10 +11,11 @@ use diaphane_runtime::Error;
 use diaphane_runtime::cpu::CpuRenderer;
 use diaphane_runtime::exact::{DepthTracer, ExactDepths};
 use diaphane_runtime::frame::Frame;
-use diaphane_runtime::gpu::GpuRenderer;
+use diaphane_runtime::gpu::{GpuDevice, GpuRenderer, Renderer, Request, instance};
 use diaphane_runtime::rendered::RayResult;
 use objects::{Object, ball, torus, uneven_grid};
 use scenes::{inside, level, outside, scene};
+use wgpu::TextureFormat;
 
 /// A renderer, or `None` after saying why.
 fn gpu(asset: &Asset) -> Option<GpuRenderer> {
@@ -305,6 +306,48 @@ fn size_and_lights_may_change() {
         .render(&Frame::new(&scenes::scene(outside()), &asset.info).unwrap(), None)
         .unwrap();
     assert!(full.picture == again.picture);
+}
+
+#[test]
+fn a_host_program_gets_the_same_picture() {
+    let asset = Object { ior: 1.5, ..ball() }.build();
+    let Some(mut gpu) = gpu(&asset) else { return };
+    let mut scene = scene(outside());
+    scene.image.samples_per_pixel = 4;
+    scene.surface.reflection = true;
+    let frame = Frame::new(&scene, &asset.info).unwrap();
+    let expected = gpu.render(&frame, None).unwrap();
+    let host = GpuDevice::open(&instance(), None).unwrap();
+    let (device, queue) = (&host.device, &host.queue);
+    let mut renderer = Renderer::new(device, queue, &asset, TextureFormat::Rgba8Unorm).unwrap();
+    // One ray first, then the other three on top.
+    for rays in [0..1, 1..4] {
+        let mut encoder = device.create_command_encoder(&Default::default());
+        let request = Request {
+            frame: &frame,
+            exact: None,
+            rays,
+            exposure: 1.0,
+        };
+        renderer.prepare(device, queue, &mut encoder, &request).unwrap();
+        queue.submit([encoder.finish()]);
+        renderer.statistics();
+    }
+    let picture = renderer.read_picture(device, queue).unwrap();
+    let peak = expected
+        .picture
+        .pixels
+        .as_flattened()
+        .iter()
+        .fold(0.0, |a: f32, b| a.max(*b));
+    let pairs = picture
+        .pixels
+        .as_flattened()
+        .iter()
+        .zip(expected.picture.pixels.as_flattened());
+    assert!(pairs.clone().all(|(a, b)| (a - b).abs() <= 1e-6 * peak));
+    assert_eq!(picture.coverage, expected.picture.coverage);
+    host.check().unwrap();
 }
 
 #[test]

@@ -15,6 +15,7 @@ struct View {
     least_distance: f32,    // where the inverse square law is clamped
     specular: f32,          // 0: no highlights
     alpha: f32,             // squared roughness
+    rays: u32,              // rays of each pixel drawn so far, this one included
 }
 
 @group(0) @binding(0) var<uniform> view: View;

@@ -1,0 +1,215 @@
+//! The passes of a frame with everything that they read and write.
+
+use super::passes::Recorder;
+use super::passes::boundary::Boundary;
+use super::passes::lighting::Lighting;
+use super::passes::profile::Profile;
+use super::passes::resolve::Resolve;
+use super::passes::segments::Segments;
+use super::passes::splat::Splat;
+use super::passes::surface::Surface;
+use super::scene::{AssetBuffers, FrameBuffers, VIEW_STRIDE, common_layout};
+use super::targets::{Targets, budget};
+use super::tiles::{Tile, split};
+use super::timers::Timers;
+use super::uniforms::ViewUniform;
+use crate::Result;
+use crate::exact::ExactDepths;
+use crate::frame::Frame;
+use crate::rendered::MAX_PIECES;
+use diaphane_formats::asset::Asset;
+use wgpu::{BindGroup, BindGroupLayout, CommandEncoder, Device, Queue};
+
+/// The passes, their buffers and their order.
+pub(super) struct Pipeline {
+    common: BindGroupLayout,
+    lighting: Lighting,
+    surface: Surface,
+    boundary: Option<Boundary>,
+    segments: Segments,
+    profile: Option<Profile>,
+    splat: Splat,
+    resolve: Resolve,
+    pub(super) asset: AssetBuffers,
+    frame: FrameBuffers,
+    targets: Option<(Targets, Groups)>,
+}
+
+/// The groups of all passes.
+struct Groups {
+    lighting: BindGroup,
+    surface: BindGroup,
+    boundary: Option<BindGroup>,
+    segments: BindGroup,
+    pieces: Vec<PieceGroups>,
+}
+
+struct PieceGroups {
+    profile: Option<BindGroup>,
+    splat: BindGroup,
+    resolve: BindGroup,
+}
+
+impl Pipeline {
+    /// Compiles the passes and uploads an asset.
+    ///
+    /// # Errors
+    /// An asset that makes no sense or is too large for the device.
+    pub fn new(device: &Device, asset: &Asset) -> Result<Self> {
+        let common = common_layout(device);
+        let asset = AssetBuffers::new(device, asset)?;
+        Ok(Self {
+            lighting: Lighting::new(device, &common, &asset),
+            surface: Surface::new(device, &common),
+            boundary: asset.fresnel.then(|| Boundary::new(device, &common)),
+            segments: Segments::new(device, &common, &asset),
+            profile: asset.heterogeneous.then(|| Profile::new(device, &common)),
+            splat: Splat::new(device, &common, &asset),
+            resolve: Resolve::new(device, &common, &asset),
+            frame: FrameBuffers::new(device, &common, &asset),
+            common,
+            asset,
+            targets: None,
+        })
+    }
+
+    /// Uploads a frame's lights, and sees that there are targets for its tiles, which it returns.
+    pub(super) fn begin(
+        &mut self,
+        device: &Device,
+        queue: &Queue,
+        frame: &Frame,
+        exact: Option<&ExactDepths>,
+    ) -> Result<Vec<Tile>> {
+        self.frame
+            .write_lights(device, queue, &self.asset, frame, exact)?;
+        let tiles = split(frame.width, frame.height, budget(device, &self.asset))?;
+        // The first tile is the largest; `split` returns at least one.
+        let fits = self
+            .targets
+            .as_ref()
+            .is_some_and(|(t, _)| t.size == tiles[0].size);
+        if !fits || self.frame.take_changed() {
+            let old = self.targets.take().map(|(t, _)| t).filter(|_| fits);
+            let targets = old.unwrap_or_else(|| Targets::new(device, &self.asset, tiles[0]));
+            let groups = self.groups(device, &targets);
+            self.targets = Some((targets, groups));
+        }
+        Ok(tiles)
+    }
+
+    /// Uploads the rays of some tiles: view `t * offsets.len() + o` is offset o in tile t, added to pictures of `before`
+    /// rays.
+    pub(super) fn write_views(
+        &mut self,
+        device: &Device,
+        queue: &Queue,
+        frame: &Frame,
+        tiles: &[Tile],
+        offsets: &[[f32; 2]],
+        before: u32,
+    ) {
+        let mut views = Vec::with_capacity(tiles.len() * offsets.len());
+        for &tile in tiles {
+            let view = |(&offset, rays)| ViewUniform::new(frame, self.asset.diagonal, tile, offset, rays);
+            views.extend(offsets.iter().zip(before + 1..).map(view));
+        }
+        self.frame
+            .write_views(device, queue, &self.common, &self.asset, &views);
+    }
+
+    /// The layout of the group that all passes share.
+    pub(super) fn common_layout(&self) -> &BindGroupLayout {
+        &self.common
+    }
+
+    /// Where the passes of a view are recorded.
+    pub(super) fn recorder<'a>(
+        &'a self,
+        encoder: &'a mut CommandEncoder,
+        timers: &'a mut Timers,
+        view: usize,
+        tile: Tile,
+    ) -> Recorder<'a> {
+        let view_offset = (view as u64 * VIEW_STRIDE) as u32;
+        Recorder {
+            encoder,
+            timers,
+            common: self.frame.common(),
+            view_offset,
+            tile: tile.size,
+        }
+    }
+
+    /// The targets of the frame that was begun.
+    pub(super) fn targets(&self) -> Option<&Targets> {
+        self.targets.as_ref().map(|(t, _)| t)
+    }
+
+    /// Records the lighting of all samples.
+    pub(super) fn record_lighting(&self, encoder: &mut CommandEncoder, timers: &mut Timers) {
+        let Some((_, groups)) = &self.targets else { return };
+        if self.asset.sample_count > 0 {
+            let mut r = Recorder {
+                encoder,
+                timers,
+                common: self.frame.common(),
+                view_offset: 0,
+                tile: [0; 2],
+            };
+            self.lighting.record(&mut r, &groups.lighting, &self.asset);
+        }
+    }
+
+    /// Records the start of a tile: an empty picture.
+    pub(super) fn record_start(&self, encoder: &mut CommandEncoder) {
+        let Some((targets, _)) = &self.targets else { return };
+        encoder.clear_buffer(&targets.radiance, 0, None);
+        encoder.clear_buffer(&targets.counters, 0, None);
+    }
+
+    /// Records one ray of every pixel of a tile, added to the picture.
+    pub(super) fn record_ray(
+        &self,
+        encoder: &mut CommandEncoder,
+        timers: &mut Timers,
+        view: usize,
+        tile: Tile,
+    ) {
+        let Some((targets, groups)) = &self.targets else {
+            return;
+        };
+        let r = &mut self.recorder(encoder, timers, view, tile);
+        self.surface.record(r, &groups.surface, &self.asset, targets);
+        if let (Some(boundary), Some(group)) = (&self.boundary, &groups.boundary) {
+            boundary.record(r, group, &self.asset, targets);
+        }
+        self.segments.record(r, &groups.segments, targets);
+        for (k, piece) in groups.pieces.iter().enumerate() {
+            if let (Some(profile), Some(group)) = (&self.profile, &piece.profile) {
+                profile.record(r, group, targets, k);
+            }
+            self.splat.record(r, &piece.splat, targets, k);
+            self.resolve.record(r, &piece.resolve, targets, k);
+        }
+    }
+
+    fn groups(&self, device: &Device, targets: &Targets) -> Groups {
+        let (asset, frame) = (&self.asset, &self.frame);
+        let piece = |k: usize| PieceGroups {
+            profile: self.profile.as_ref().map(|p| p.bind(device, asset, targets, k)),
+            splat: self.splat.bind(device, asset, targets, k),
+            resolve: self.resolve.bind(device, targets, k),
+        };
+        Groups {
+            lighting: self.lighting.bind(device, asset, frame),
+            surface: self.surface.bind(device, asset, targets),
+            boundary: self
+                .boundary
+                .as_ref()
+                .map(|b| b.bind(device, asset, frame, targets)),
+            segments: self.segments.bind(device, targets),
+            pieces: (0..MAX_PIECES).map(piece).collect(),
+        }
+    }
+}
