@@ -9,6 +9,10 @@ use diaphane_formats::mesh::Mesh;
 use glam::DVec3;
 use half::f16;
 
+/// Range of an offset in 127ths of a radius.
+const LEAST: DVec3 = DVec3::splat(-127.0);
+const MOST: DVec3 = DVec3::splat(127.0);
+
 pub(crate) fn pack(
     input: &Input<'_>,
     sampled: Option<&SampledDensity>,
@@ -27,6 +31,15 @@ pub(crate) fn pack(
         .map(|s| {
             let [x, y, z] = local(s.position);
             [x, y, z, s.radius as f32]
+        })
+        .collect();
+    let offset = lit
+        .samples
+        .iter()
+        .zip(&lit.centroids)
+        .map(|(s, c)| {
+            let [x, y, z] = ((*c - s.position) * (127.0 / s.radius)).round().clamp(LEAST, MOST).to_array();
+            [x as i8, y as i8, z as i8, 0]
         })
         .collect();
     let info = Info {
@@ -55,7 +68,7 @@ pub(crate) fn pack(
     };
     let asset = Asset {
         info,
-        samples: Samples { position_radius, weight, depth: harmonics.depth, boundary: harmonics.boundary },
+        samples: Samples { position_radius, offset, weight, depth: harmonics.depth, boundary: harmonics.boundary },
         mesh_positions: input.mesh.positions.iter().map(|p| local(*p)).collect(),
         mesh_triangles: input.mesh.triangles.clone(),
         density: density_grid(medium, sampled, centre),

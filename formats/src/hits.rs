@@ -12,6 +12,7 @@
 
 use crate::kernel::{self, CUT_OFF, CUT_OFF_VALUE};
 use crate::reconstruct::{Along, PieceSum};
+use crate::slopes::{MOST_EXPONENT, Source};
 use glam::Vec3;
 
 /// Kernels worked on at once.
@@ -34,8 +35,31 @@ pub struct Hit {
     pub a: f32,
     /// Weight w.
     pub weight: f32,
-    /// v, per channel.
+    /// v at the kernel's centre, per channel.
     pub source: Vec3,
+    /// ln of how much v grows from the centre to the ray's closest approach, per channel.
+    pub rise: [f32; 3],
+    /// Slope of ln v along the ray, per channel.
+    pub slope: [f32; 3],
+}
+
+impl Hit {
+    /// A kernel at `to_centre` from the ray's origin; `None` where the ray (unit direction) misses its support.
+    #[inline]
+    pub fn new(to_centre: Vec3, direction: Vec3, a: f32, weight: f32, source: &Source) -> Option<Self> {
+        let tc = to_centre.dot(direction);
+        let across = to_centre - direction * tc;
+        let d2 = across.length_squared();
+        (a * a * d2 < CUT_OFF).then(|| Self {
+            tc,
+            d2,
+            a,
+            weight,
+            source: source.value,
+            rise: source.slope.map(|h| -h.dot(across)),
+            slope: source.slope.map(|h| h.dot(direction)),
+        })
+    }
 }
 
 #[derive(Clone, Copy)]
@@ -45,6 +69,8 @@ struct Chunk {
     a: Lanes,
     weight: Lanes,
     source: [Lanes; 3],
+    rise: [Lanes; 3],
+    slope: [Lanes; 3],
 }
 
 impl Chunk {
@@ -55,7 +81,24 @@ impl Chunk {
         a: [1.0; LANES],
         weight: [0.0; LANES],
         source: [[0.0; LANES]; 3],
+        rise: [[0.0; LANES]; 3],
+        slope: [[0.0; LANES]; 3],
     };
+}
+
+impl Chunk {
+    /// v of channel `c`, averaged over each kernel's weight along the ray, whose mean lies `mean` behind the closest
+    /// approach: v e^{rise + slope · mean + slope² / 4a²}, the last term for the weight's spread 1/2a².
+    #[inline(always)]
+    fn source_at(&self, c: usize, mean: &Lanes) -> Lanes {
+        let mut out = [0.0; LANES];
+        for (k, out) in out.iter_mut().enumerate() {
+            let s = self.slope[c][k];
+            let exponent = self.rise[c][k] + s * (mean[k] + 0.25 * s / (self.a[k] * self.a[k]));
+            *out = self.source[c][k] * exp(exponent.clamp(-MOST_EXPONENT, MOST_EXPONENT));
+        }
+        out
+    }
 }
 
 /// The part of each lane's support inside a piece, and its weight (0 where there is none).
@@ -102,8 +145,10 @@ impl Hits {
             chunk.d2[lane] = hit.d2;
             chunk.a[lane] = hit.a;
             chunk.weight[lane] = hit.weight;
-            for (c, lanes) in chunk.source.iter_mut().enumerate() {
-                lanes[lane] = hit.source[c];
+            for c in 0..3 {
+                chunk.source[c][lane] = hit.source[c];
+                chunk.rise[c][lane] = hit.rise[c];
+                chunk.slope[c][lane] = hit.slope[c];
             }
         }
     }
@@ -124,16 +169,16 @@ impl Hits {
             splats += count as u32;
             let path = Path::new(along, &clipped, start);
             if grey {
-                let w = path.weights(kappa.x, chunk, &clipped, end - start);
+                let (w, mean) = path.weights(kappa.x, chunk, &clipped, end - start);
                 add(&mut denominator[0], &w);
-                for (sum, source) in numerator.iter_mut().zip(&chunk.source) {
-                    add_product(sum, &w, source);
+                for (c, sum) in numerator.iter_mut().enumerate() {
+                    add_product(sum, &w, &chunk.source_at(c, &mean));
                 }
             } else {
                 for c in 0..3 {
-                    let w = path.weights(kappa[c], chunk, &clipped, end - start);
+                    let (w, mean) = path.weights(kappa[c], chunk, &clipped, end - start);
                     add(&mut denominator[c], &w);
-                    add_product(&mut numerator[c], &w, &chunk.source[c]);
+                    add_product(&mut numerator[c], &w, &chunk.source_at(c, &mean));
                 }
             }
         }
@@ -185,17 +230,17 @@ impl Path {
         path
     }
 
-    /// W_i of every lane for the extinction `kappa` of one channel.
-    fn weights(&self, kappa: f32, chunk: &Chunk, clipped: &Clipped, piece: f32) -> Lanes {
+    /// W_i of every lane for the extinction `kappa` of one channel, and the mean of t - tc under it.
+    fn weights(&self, kappa: f32, chunk: &Chunk, clipped: &Clipped, piece: f32) -> (Lanes, Lanes) {
         let (mut mild, mut long) = (true, true);
         for k in 0..LANES {
             mild &= kappa * self.density[k] <= chunk.a[k];
             long &= piece * chunk.a[k] >= LEAST_WIDTHS;
         }
-        let mut out = [0.0; LANES];
+        let (mut out, mut mean) = ([0.0; LANES], [0.0; LANES]);
         if mild && long {
-            for (k, out) in out.iter_mut().enumerate() {
-                let w = mild_integral(
+            for k in 0..LANES {
+                let (w, m) = mild_integral(
                     chunk.a[k],
                     chunk.d2[k],
                     clipped.from[k] - chunk.tc[k],
@@ -203,7 +248,8 @@ impl Path {
                     kappa * self.density[k],
                     kappa * self.before[k],
                 );
-                *out = w * (clipped.weight[k] * self.scattering[k]);
+                out[k] = w * (clipped.weight[k] * self.scattering[k]);
+                mean[k] = m;
             }
         } else {
             for k in (0..LANES).filter(|&k| clipped.weight[k] > 0.0) {
@@ -217,9 +263,11 @@ impl Path {
                     to,
                 );
                 out[k] = g * (-kappa * self.before[k]).exp() * (clipped.weight[k] * self.scattering[k]);
+                mean[k] =
+                    kernel::mean_offset(chunk.a[k], chunk.d2[k], chunk.tc[k], kappa * self.density[k], from, to, g);
             }
         }
-        out
+        (out, mean)
     }
 }
 
@@ -255,9 +303,9 @@ fn clip(chunk: &Chunk, start: f32, end: f32) -> Clipped {
     clipped
 }
 
-/// W of the module's head without w, for κ ≤ a; `s` = from - tc.
+/// W of the module's head without w, for κ ≤ a, and the mean of t - tc (see [`kernel::mean_offset`]); `s` = from - tc.
 #[inline(always)]
-fn mild_integral(a: f32, d2: f32, s: f32, length: f32, kappa: f32, before: f32) -> f32 {
+fn mild_integral(a: f32, d2: f32, s: f32, length: f32, kappa: f32, before: f32) -> (f32, f32) {
     const HALF_ROOT_PI: f32 = 0.886_226_95;
     let inverse = 1.0 / a;
     let half = 0.5 * kappa * inverse;
@@ -270,8 +318,15 @@ fn mild_integral(a: f32, d2: f32, s: f32, length: f32, kappa: f32, before: f32) 
     let exact = (1.0 - exp(-y)) / y;
     let mean = if y < 0.2 { series } else { exact };
     let cut = CUT_OFF_VALUE * length * mean * exp(-before);
-    let w = HALF_ROOT_PI * inverse * scale * (erf(x1) - erf(x0)) - cut;
-    if w > 0.0 { w } else { 0.0 }
+    let whole = HALF_ROOT_PI * inverse * scale * (erf(x1) - erf(x0));
+    let w = whole - cut;
+    let u1 = u0 + a * length;
+    let ends = exp(-a * a * d2 - u0 * u0 - before) - exp(-a * a * d2 - u1 * u1 - y - before);
+    let whole = if whole > 1e-30 { whole } else { 1e-30 };
+    let mean = inverse * (0.5 * inverse * ends / whole - half);
+    let mean = if mean > s { mean } else { s };
+    let mean = if mean < s + length { mean } else { s + length };
+    (if w > 0.0 { w } else { 0.0 }, mean)
 }
 
 /// e^x for x ≤ 88, relative error below 2e-7; 1e-38 stands for all smaller values. The power of two is split off by
@@ -340,12 +395,18 @@ mod tests {
                 };
                 let before = kappa * (from - start);
                 let exact = kernel::integral(a, d2, tc, kappa, from, to) * (-before).exp();
-                let got = mild_integral(a, d2, from - tc, to - from, kappa, before);
+                let (got, mean) = mild_integral(a, d2, from - tc, to - from, kappa, before);
                 assert!(
                     (got - exact).abs() <= 6e-6 / a,
                     "a {a} κ {kappa}: {got} {exact} {}",
                     (got - exact) * a
                 );
+                // The mean matters as far as the kernel has weight.
+                let whole = kernel::integral(a, d2, tc, kappa, from, to);
+                let general = kernel::mean_offset(a, d2, tc, kappa, from, to, whole);
+                if a * whole > 0.05 {
+                    assert!((mean - general).abs() * a < 1e-3, "a {a} κ {kappa}: {mean} {general}");
+                }
             }
         }
     }
@@ -361,6 +422,8 @@ mod tests {
             a: 2.0,
             weight: 0.5,
             source: Vec3::new(1.0, 2.0, 3.0),
+            rise: [0.0; 3],
+            slope: [0.0; 3],
         });
         let sum = hits.piece_radiance(0.0, 2.0, &along);
         assert_eq!(sum.splats, 1);

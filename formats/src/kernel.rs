@@ -84,6 +84,21 @@ pub fn integral(a: f32, d2: f32, tc: f32, kappa: f32, start: f32, end: f32) -> f
     (HALF_ROOT_PI / a * sum - cut).max(0.0)
 }
 
+/// Mean of t - tc over `start..end` under the attenuated Gaussian, given G = [`integral`] of the same arguments:
+///
+///   -κ/2a² + [f(start) - f(end)] / (2a² ∫f),   ∫f = G + e^{-C} ∫e^{-κ(t-start)} dt,
+///
+/// because f' = -2a² (t - tc + κ/2a²) f. Always within the piece.
+pub fn mean_offset(a: f32, d2: f32, tc: f32, kappa: f32, start: f32, end: f32, integral: f32) -> f32 {
+    let length = end - start;
+    let (u0, u1) = (a * (start - tc), a * (end - tc));
+    let ad2 = a * a * d2;
+    let ends = (-ad2 - u0 * u0).exp() - (-ad2 - u1 * u1 - kappa * length).exp();
+    let whole = integral + CUT_OFF_VALUE * length * decay_mean(kappa * length);
+    let mean = (0.5 / a * ends / whole.max(1e-30) - kappa / (2.0 * a)) / a;
+    mean.max(start - tc).min(end - tc)
+}
+
 /// Three-point Gauss-Legendre rule for pieces much shorter than the kernel and the mean free path.
 fn short_integral(ad2: f32, u0: f32, a: f32, kappa: f32, length: f32) -> f32 {
     const NODES: [f32; 3] = [0.112_701_67, 0.5, 0.887_298_35];
@@ -182,6 +197,30 @@ mod tests {
                 let scale = (f64::from(e - s)).min(1.0 / f64::from(kappa).max(1e-30));
                 prop_assert!(got.is_finite() && got >= 0.0);
                 prop_assert!((got - exact).abs() <= 4e-6 * scale, "got {got} exact {exact} scale {scale}");
+            }
+        }
+
+        /// The closed-form mean against quadrature of t under the bare attenuated Gaussian.
+        #[test]
+        fn mean_offset_matches_quadrature(depth in -3.0f64..2.0, d in 0.0f64..0.9, from in -1.0f64..1.0, to in -1.0f64..1.0) {
+            let (a, tc) = (20.0f64, 0.3f64);
+            let kappa = 10f64.powf(depth) * a;
+            let radius = f64::from(CUT_OFF_RADIUS) / a;
+            let h = radius * (1.0 - d * d).sqrt();
+            let (s, e) = (tc + from.min(to) * h, tc + from.max(to) * h);
+            if (e - s) * a > 0.3 {
+                let d2 = (d * radius).powi(2);
+                let (mut sum, mut first) = (0.0, 0.0);
+                for i in 0..20_000 {
+                    let t = s + (e - s) * (f64::from(i) + 0.5) / 20_000.0;
+                    let f = (-kappa * (t - s) - a * a * (t - tc) * (t - tc)).exp();
+                    sum += f;
+                    first += f * (t - tc);
+                }
+                let args = [a, d2, tc, kappa, s, e].map(|v| v as f32);
+                let g = integral(args[0], args[1], args[2], args[3], args[4], args[5]);
+                let got = f64::from(mean_offset(args[0], args[1], args[2], args[3], args[4], args[5], g));
+                prop_assert!((got - first / sum).abs() * a < 5e-3, "{got} {}", first / sum);
             }
         }
 

@@ -27,6 +27,7 @@ pub mod picture;
 pub mod reconstruct;
 pub mod scene;
 pub mod sh;
+pub mod slopes;
 mod toml_keys;
 pub mod visibility;
 

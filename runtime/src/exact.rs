@@ -61,7 +61,7 @@ impl DepthTracer {
             mesh: asset.mesh()?,
             medium: asset.medium()?,
             places: (0..asset.samples.len())
-                .map(|i| asset.samples.position(i))
+                .map(|i| asset.samples.centroid(i))
                 .collect(),
             accel: OnceLock::new(),
             traced: Vec::new(),

@@ -1,6 +1,7 @@
 //! Samples that single precision can draw.
 
 use diaphane_formats::asset::{Asset, Samples};
+use diaphane_formats::slopes::Stencil;
 
 /// An asset's samples, where those whose place, size or weight would overflow single precision lost their weight and
 /// moved to the centre: no bake makes such samples, but a file can hold them. Order and number are kept.
@@ -16,4 +17,16 @@ pub fn usable_samples(asset: &Asset) -> Samples {
         }
     }
     samples
+}
+
+/// Gradient stencils of an asset's (usable) samples, limited by its largest extinction.
+pub fn slope_stencil(asset: &Asset, samples: &Samples) -> Stencil {
+    let extinction = asset.info.extinction.into_iter().fold(0.0, f64::max) as f32;
+    Stencil::new(samples, |x| {
+        let density = match &asset.density {
+            Some(grid) => grid.value(x)[0],
+            None => asset.info.uniform_density as f32,
+        };
+        (extinction * density).min(1e30)
+    })
 }

@@ -43,12 +43,15 @@ pub(super) enum Kind {
     MeshTriangles = 7,
     /// u32 × 3 size, f32 × 6 bounds, then f16 × 2 a voxel.
     Density = 8,
+    /// i8 × 4: from the position to the centroid.
+    Offset = 9,
 }
 
 impl Kind {
-    pub(super) const ALL: [(Self, &'static str); 8] = [
+    pub(super) const ALL: [(Self, &'static str); 9] = [
         (Self::Info, "info"),
         (Self::PositionRadius, "position_radius"),
+        (Self::Offset, "offset"),
         (Self::Weight, "weight"),
         (Self::Depth, "depth"),
         (Self::Boundary, "boundary"),

@@ -43,6 +43,8 @@ pub struct Asset {
 pub struct Samples {
     /// Position relative to the centre, and Poisson-disk radius, mesh units.
     pub position_radius: Vec<[f32; 4]>,
+    /// Where the values hold: (centroid - position) · 127 / radius, and a zero.
+    pub offset: Vec<[i8; 4]>,
     /// Partition-of-unity weight of the kernel, ≥ 0.
     pub weight: Vec<f32>,
     /// Spherical-harmonics coefficients of the encoded optical depth, `order`² for each sample.
@@ -66,6 +68,13 @@ impl Samples {
     pub fn position(&self, i: usize) -> Vec3 {
         let [x, y, z, _] = self.position_radius[i];
         Vec3::new(x, y, z)
+    }
+
+    /// Centroid of the neighbourhood that sample `i` stands for, relative to the centre.
+    pub fn centroid(&self, i: usize) -> Vec3 {
+        let [x, y, z, _] = self.offset[i];
+        let radius = self.position_radius[i][3];
+        self.position(i) + Vec3::new(f32::from(x), f32::from(y), f32::from(z)) * (radius / 127.0)
     }
 }
 
@@ -117,7 +126,7 @@ impl Asset {
         let n = self.samples.len();
         let k = coefficient_count(self.info.order as usize);
         let fail = |what: &str| Err(Error::invalid(format!("the asset's {what} do not fit together")));
-        if self.info.samples as usize != n || self.samples.weight.len() != n || self.samples.depth.len() != n * k {
+        if self.info.samples as usize != n || self.samples.weight.len() != n || self.samples.offset.len() != n || self.samples.depth.len() != n * k {
             return fail("sample sections");
         }
         let boundary = if self.info.ior == 1.0 { 0 } else { n * k };

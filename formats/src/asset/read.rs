@@ -25,6 +25,7 @@ pub fn parse(bytes: &[u8]) -> Result<Asset> {
         info: codec::decode(need(Kind::Info)?)?,
         samples: Samples {
             position_radius: groups(&floats(need(Kind::PositionRadius)?)?)?,
+            offset: groups(&signed(need(Kind::Offset)?))?,
             weight: floats(need(Kind::Weight)?)?,
             depth: halves(need(Kind::Depth)?)?,
             boundary: find(Kind::Boundary)?.map_or(Ok(Vec::new()), halves)?,
@@ -63,6 +64,10 @@ fn ragged() -> Error {
 fn words(bytes: &[u8]) -> Result<Vec<u32>> {
     let (chunks, []) = bytes.as_chunks::<4>() else { return Err(ragged()) };
     Ok(chunks.iter().map(|c| u32::from_le_bytes(*c)).collect())
+}
+
+fn signed(bytes: &[u8]) -> Vec<i8> {
+    bytes.iter().map(|b| *b as i8).collect()
 }
 
 fn floats(bytes: &[u8]) -> Result<Vec<f32>> {

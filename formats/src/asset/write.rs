@@ -20,6 +20,7 @@ pub fn encode(asset: &Asset) -> Result<Vec<u8>> {
     let mut sections = vec![
         (Kind::Info, codec::encode(&asset.info)?),
         (Kind::PositionRadius, floats(&mut s.position_radius.iter().flatten().copied())),
+        (Kind::Offset, s.offset.iter().flatten().map(|v| *v as u8).collect()),
         (Kind::Weight, floats(&mut s.weight.iter().copied())),
         (Kind::Depth, halves(&s.depth)),
     ];

@@ -7,6 +7,7 @@ use super::{CpuRenderer, surface};
 use crate::frame::Frame;
 use crate::rendered::{Counters, RayResult};
 use diaphane_formats::hits::Hits;
+use diaphane_formats::slopes::Source;
 use glam::Vec3;
 use std::time::Instant;
 
@@ -17,7 +18,7 @@ pub struct Shared<'a> {
     /// The frame.
     pub frame: &'a Frame,
     /// Source of every sample.
-    pub sources: &'a [Vec3],
+    pub sources: &'a [Source],
     /// Kernels relative to the camera.
     pub kernels: &'a [Kernel],
     /// Places of the rays inside a pixel, 0..1.
@@ -168,13 +169,13 @@ impl Shared<'_> {
         }
         let renderer = self.renderer;
         tiles::select(&work.block, self.frame, tile, &mut work.tile);
-        work.candidates.fill(&work.tile, &renderer.cloud, self.sources);
+        work.candidates.fill(&work.tile, &renderer.cloud);
         let medium = RayMedium {
             extinction: renderer.extinction,
             density: renderer.density.as_ref(),
         };
         for ray in &work.rays {
-            work.candidates.along(ray.direction, &mut work.hits);
+            work.candidates.along(ray.direction, self.sources, &mut work.hits);
             let origin = self.frame.view.origin;
             let (radiance, splats) = splat::ray(&work.hits, medium, origin, ray.direction, &ray.segments);
             visit(ray, radiance, splats);

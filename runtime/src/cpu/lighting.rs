@@ -1,10 +1,11 @@
 //! Light that each sample scatters towards the camera.
 //!
-//! Per channel, with E_l the irradiance and ω_l the direction of light l at the sample's place b, Ω the albedo:
+//! Per channel, with E_l the irradiance and ω_l the direction of light l at the sample's centroid b, Ω the albedo:
 //!
 //!   v(b) = Ω Σ_l p(cos_l) E_l(b) ψ(b, ω_l) β(b, ω_l),   cos_l = dot(-ω_l, normalize(camera - b))
 //!
-//! v is the source of [`diaphane_formats::reconstruct`]: in-scattered radiance per unit of κt dt, albedo included.
+//! v is in-scattered radiance per unit of κt dt, albedo included; with its slopes ([`diaphane_formats::slopes`]) it is
+//! the source of [`diaphane_formats::reconstruct`].
 //! ψ = exp(-κ/κ̄ · τ̄) with τ̄ decoded from the sample's spherical harmonics (κ̄ = 0: ψ = 1); β is the boundary's
 //! Fresnel transmittance from its own coefficients, clamped to 0..1 (index matched: 1). A table of exact depths m
 //! gives ψ = exp(-κ m) and β instead. Lights that do not reach the sample (outside a spot's cone) are skipped.
@@ -54,8 +55,8 @@ impl Lighting {
         }
     }
 
-    /// The source of every sample, in the samples' order; parallel over samples.
-    pub fn sources(&self, samples: &Samples, frame: &Frame, exact: Option<&ExactDepths>) -> Vec<Vec3> {
+    /// v of every sample at its centroid, in the samples' order; parallel over samples.
+    pub fn values(&self, samples: &Samples, frame: &Frame, exact: Option<&ExactDepths>) -> Vec<Vec3> {
         let lights: Vec<Prepared> = frame
             .lights
             .iter()
@@ -92,7 +93,7 @@ impl Lighting {
     }
 
     fn source(&self, samples: &Samples, i: usize, frame: &Frame, lights: &[Prepared]) -> Vec3 {
-        let place = samples.position(i);
+        let place = samples.centroid(i);
         let towards_camera = (frame.view.origin - place).normalize_or_zero();
         let count = self.order * self.order;
         let depth = &samples.depth[i * count..(i + 1) * count];

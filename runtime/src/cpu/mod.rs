@@ -11,12 +11,13 @@ use crate::Result;
 use crate::exact::ExactDepths;
 use crate::frame::Frame;
 use crate::rendered::{Counters, RayResult, Rendered};
-use crate::usable::usable_samples;
+use crate::usable::{slope_stencil, usable_samples};
 use block::{Block, Shared};
 use diaphane_formats::asset::{Asset, DensityGrid, Samples};
 use diaphane_formats::directions::subpixel_offsets;
 use diaphane_formats::picture::Picture;
 use diaphane_formats::reconstruct::Cloud;
+use diaphane_formats::slopes::{Source, Stencil};
 use diaphane_formats::visibility::Accel;
 use glam::{DVec3, Vec3};
 use lighting::Lighting;
@@ -32,6 +33,7 @@ pub struct CpuRenderer {
     samples: Samples,
     lighting: Lighting,
     cloud: Cloud,
+    stencil: Stencil,
     accel: Accel,
     density: Option<DensityGrid>,
     extinction: Vec3,
@@ -55,6 +57,7 @@ impl CpuRenderer {
         Ok(Self {
             lighting: Lighting::new(asset),
             cloud: Cloud::new(&samples, asset.info.width_factor),
+            stencil: slope_stencil(asset, &samples),
             accel: Accel::new(&mesh),
             density: asset.density.clone(),
             extinction: extinction.min(DVec3::splat(MOST_EXTINCTION)).as_vec3(),
@@ -69,8 +72,8 @@ impl CpuRenderer {
     }
 
     /// The source of every sample under the frame's lights, see [`lighting`].
-    pub fn sources(&self, frame: &Frame, exact: Option<&ExactDepths>) -> Vec<Vec3> {
-        self.lighting.sources(&self.samples, frame, exact)
+    pub fn sources(&self, frame: &Frame, exact: Option<&ExactDepths>) -> Vec<Source> {
+        self.stencil.sources(&self.lighting.values(&self.samples, frame, exact))
     }
 
     /// Draws a frame.
@@ -133,7 +136,7 @@ impl CpuRenderer {
     }
 
     /// What one ray of every pixel sees, at `offset` inside the pixel (0..1): rows one after the other.
-    pub fn trace_rays(&self, frame: &Frame, sources: &[Vec3], offset: [f32; 2]) -> Vec<RayResult> {
+    pub fn trace_rays(&self, frame: &Frame, sources: &[Source], offset: [f32; 2]) -> Vec<RayResult> {
         let kernels = tiles::kernels(&self.cloud, frame.view.origin);
         let shared = Shared {
             renderer: self,

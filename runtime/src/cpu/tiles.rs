@@ -13,6 +13,7 @@ use crate::frame::{Frame, View};
 use diaphane_formats::hits::{Hit, Hits, LANES, Lanes};
 use diaphane_formats::kernel::{CUT_OFF, CUT_OFF_RADIUS};
 use diaphane_formats::reconstruct::Cloud;
+use diaphane_formats::slopes::Source;
 use glam::Vec3;
 
 /// Side of a block of tiles, pixels.
@@ -136,7 +137,7 @@ struct Chunk {
     support2: Lanes,
     a: Lanes,
     weight: Lanes,
-    source: [Lanes; 3],
+    index: [u32; LANES],
 }
 
 impl Chunk {
@@ -145,7 +146,7 @@ impl Chunk {
         support2: [-1.0; LANES],
         a: [1.0; LANES],
         weight: [0.0; LANES],
-        source: [[0.0; LANES]; 3],
+        index: [0; LANES],
     };
 }
 
@@ -157,21 +158,20 @@ pub struct Candidates {
 
 impl Candidates {
     /// Copies the kernels of a tile together.
-    pub fn fill(&mut self, kernels: &[Kernel], cloud: &Cloud, sources: &[Vec3]) {
+    pub fn fill(&mut self, kernels: &[Kernel], cloud: &Cloud) {
         self.chunks.clear();
         for group in kernels.chunks(LANES) {
             let mut chunk = Chunk::EMPTY;
             for (lane, kernel) in group.iter().enumerate() {
                 let i = kernel.index as usize;
                 let a = cloud.sharpness[i];
-                let source = sources[i];
                 for c in 0..3 {
                     chunk.centre[c][lane] = kernel.centre[c];
-                    chunk.source[c][lane] = source[c];
                 }
                 chunk.support2[lane] = CUT_OFF / (a * a);
                 chunk.a[lane] = a;
                 chunk.weight[lane] = cloud.weight[i];
+                chunk.index[lane] = kernel.index;
             }
             self.chunks.push(chunk);
         }
@@ -188,32 +188,23 @@ impl Candidates {
     }
 
     /// The kernels whose support the line through the camera along `direction` (unit) meets, into `hits` (cleared).
-    pub fn along(&self, direction: Vec3, hits: &mut Hits) {
+    pub fn along(&self, direction: Vec3, sources: &[Source], hits: &mut Hits) {
         hits.clear();
         for chunk in &self.chunks {
-            let (mut tc, mut d2, mut inside) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
+            let mut inside = [0.0; LANES];
             let [x, y, z] = &chunk.centre;
             for k in 0..LANES {
                 let t = x[k] * direction.x + y[k] * direction.y + z[k] * direction.z;
-                let (px, py, pz) = (
-                    x[k] - direction.x * t,
-                    y[k] - direction.y * t,
-                    z[k] - direction.z * t,
-                );
-                tc[k] = t;
-                d2[k] = px * px + py * py + pz * pz;
-                inside[k] = chunk.support2[k] - d2[k];
+                let (px, py, pz) = (x[k] - direction.x * t, y[k] - direction.y * t, z[k] - direction.z * t);
+                inside[k] = chunk.support2[k] - (px * px + py * py + pz * pz);
             }
             for k in 0..LANES {
                 if inside[k] > 0.0 {
-                    let source = Vec3::new(chunk.source[0][k], chunk.source[1][k], chunk.source[2][k]);
-                    hits.push(Hit {
-                        tc: tc[k],
-                        d2: d2[k],
-                        a: chunk.a[k],
-                        weight: chunk.weight[k],
-                        source,
-                    });
+                    let centre = Vec3::new(x[k], y[k], z[k]);
+                    let source = &sources[chunk.index[k] as usize];
+                    if let Some(hit) = Hit::new(centre, direction, chunk.a[k], chunk.weight[k], source) {
+                        hits.push(hit);
+                    }
                 }
             }
         }

@@ -5,7 +5,7 @@ use super::pipeline::Pipeline;
 use super::readback;
 use super::targets::Targets;
 use super::tiles::Tile;
-use super::timers::{Pass, Timers};
+use super::timers::{Pass, Timers, PASSES};
 use crate::exact::ExactDepths;
 use crate::frame::Frame;
 use crate::rendered::{Counters, MAX_PIECES, RayResult, Rendered};
@@ -134,7 +134,7 @@ impl GpuRenderer {
         exact: Option<&ExactDepths>,
         offsets: &[[f32; 2]],
         mut take: impl FnMut(Tile, TileData),
-    ) -> Result<[f64; 7]> {
+    ) -> Result<[f64; PASSES]> {
         let GpuDevice { device, queue, .. } = &self.owned;
         let tiles = self.renderer.begin(device, queue, frame, exact)?;
         self.tiles = tiles.len();
@@ -142,7 +142,7 @@ impl GpuRenderer {
         if self.timers.capacity() < submissions {
             self.timers = Timers::new(device, queue, submissions);
         }
-        let mut milliseconds = [0.0; 7];
+        let mut milliseconds = [0.0; PASSES];
         for (t, &tile) in tiles.iter().enumerate() {
             self.renderer
                 .write_views(device, queue, frame, &[tile], offsets, 0);
@@ -175,7 +175,7 @@ impl GpuRenderer {
     fn read(
         &self,
         tile: Tile,
-        milliseconds: &mut [f64; 7],
+        milliseconds: &mut [f64; PASSES],
         take: &mut impl FnMut(Tile, TileData),
     ) -> Result<()> {
         let targets = self

@@ -7,6 +7,7 @@ pub(super) mod profile;
 pub(super) mod publish;
 pub(super) mod resolve;
 pub(super) mod segments;
+pub(super) mod slopes;
 pub(super) mod splat;
 pub(super) mod surface;
 

@@ -3,6 +3,7 @@
 use super::passes::Recorder;
 use super::passes::boundary::Boundary;
 use super::passes::lighting::Lighting;
+use super::passes::slopes::Slopes;
 use super::passes::profile::Profile;
 use super::passes::resolve::Resolve;
 use super::passes::segments::Segments;
@@ -24,6 +25,7 @@ use wgpu::{BindGroup, BindGroupLayout, CommandEncoder, Device, Queue};
 pub(super) struct Pipeline {
     common: BindGroupLayout,
     lighting: Lighting,
+    slopes: Slopes,
     surface: Surface,
     boundary: Option<Boundary>,
     segments: Segments,
@@ -38,6 +40,7 @@ pub(super) struct Pipeline {
 /// The groups of all passes.
 struct Groups {
     lighting: BindGroup,
+    slopes: BindGroup,
     surface: BindGroup,
     boundary: Option<BindGroup>,
     segments: BindGroup,
@@ -60,6 +63,7 @@ impl Pipeline {
         let asset = AssetBuffers::new(device, asset)?;
         Ok(Self {
             lighting: Lighting::new(device, &common, &asset),
+            slopes: Slopes::new(device, &common),
             surface: Surface::new(device, &common),
             boundary: asset.fresnel.then(|| Boundary::new(device, &common)),
             segments: Segments::new(device, &common, &asset),
@@ -158,6 +162,7 @@ impl Pipeline {
                 tile: [0; 2],
             };
             self.lighting.record(&mut r, &groups.lighting, &self.asset);
+            self.slopes.record(&mut r, &groups.slopes, &self.asset);
         }
     }
 
@@ -203,6 +208,7 @@ impl Pipeline {
         };
         Groups {
             lighting: self.lighting.bind(device, asset, frame),
+            slopes: self.slopes.bind(device, asset),
             surface: self.surface.bind(device, asset, targets),
             boundary: self
                 .boundary

@@ -7,7 +7,7 @@ use super::passes::publish::Publish;
 use super::pipeline::Pipeline;
 use super::readback;
 use super::targets::SUM_FORMAT;
-use super::timers::{Pass, Reading, Timers};
+use super::timers::{Pass, Reading, Timers, PASSES};
 use crate::exact::ExactDepths;
 use crate::frame::Frame;
 use crate::rendered::Counters;
@@ -155,6 +155,11 @@ impl Renderer {
         Ok(())
     }
 
+    /// Changes the exposure of the picture that is there.
+    pub fn expose(&self, queue: &Queue, exposure: f32) {
+        self.display.write(queue, exposure);
+    }
+
     /// Fills the pass's viewport with the picture.
     pub fn render(&self, pass: &mut RenderPass<'_>) {
         if let Some(shown) = &self.picture {
@@ -240,7 +245,7 @@ impl Renderer {
         if let Some((buffer, reading)) = &pending.timers
             && let Ok(view) = buffer.get_mapped_range(..)
         {
-            let mut milliseconds = [0.0; 7];
+            let mut milliseconds = [0.0; PASSES];
             reading.sum(&view, &mut milliseconds);
             self.statistics.passes = Pass::named(&milliseconds);
         }

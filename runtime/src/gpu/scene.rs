@@ -6,9 +6,10 @@ use super::uniforms::{LightRecord, MediumUniform, ViewUniform};
 use crate::cpu::surface::corner_normals;
 use crate::exact::ExactDepths;
 use crate::frame::Frame;
-use crate::usable::usable_samples;
+use crate::usable::{slope_stencil, usable_samples};
 use crate::{Error, Result};
 use diaphane_formats::asset::Asset;
+use diaphane_formats::slopes::NEIGHBOURS;
 use diaphane_formats::{kernel, sh};
 use wgpu::{BindGroup, BindGroupLayout, Buffer, BufferBinding, BufferUsages, Device, Queue, ShaderStages};
 
@@ -25,7 +26,13 @@ pub(super) struct AssetBuffers {
     pub boundary: Buffer,
     pub recurrence: Buffer,
     pub grid: Buffer,
+    /// Where values hold, and the largest slope.
+    pub centroids: Buffer,
+    /// Gradient stencils.
+    pub spokes: Buffer,
     /// Written by the lighting pass.
+    pub values: Buffer,
+    /// Written by the slopes pass.
     pub sources: Buffer,
     pub sample_count: u32,
     pub samples_drawn: u64,
@@ -50,6 +57,15 @@ impl AssetBuffers {
             .iter()
             .map(|&[x, y, z, radius]| [x, y, z, kernel::sharpness(radius, info.width_factor)])
             .collect();
+        let stencil = slope_stencil(asset, &samples);
+        let centroids: Vec<[f32; 4]> =
+            stencil.centroid.iter().zip(&stencil.limit).map(|(c, limit)| c.extend(*limit).to_array()).collect();
+        let spokes: Vec<[f32; 4]> = stencil
+            .spokes
+            .as_flattened()
+            .iter()
+            .map(|s| s.gradient.extend(f32::from_bits(s.neighbour)).to_array())
+            .collect();
         let normals = if fresnel {
             corner_normals(&asset.mesh()?)
         } else {
@@ -66,7 +82,7 @@ impl AssetBuffers {
         let largest = [
             4 * samples.depth.len(),
             4 * samples.boundary.len(),
-            16 * kernels.len(),
+            16 * NEIGHBOURS * kernels.len(),
             36 * asset.mesh_triangles.len(),
             12 * asset.mesh_positions.len(),
             4 * grid.len(),
@@ -93,7 +109,10 @@ impl AssetBuffers {
             boundary: filled_buffer(device, "boundary", &samples.boundary, storage),
             recurrence: filled_buffer(device, "recurrence", &recurrence, BufferUsages::UNIFORM),
             grid: filled_buffer(device, "grid", grid, storage),
-            sources: empty_buffer(device, "sources", 16 * kernels.len() as u64, storage),
+            centroids: filled_buffer(device, "centroids", &centroids, storage),
+            spokes: filled_buffer(device, "spokes", &spokes, storage),
+            values: empty_buffer(device, "values", 16 * kernels.len() as u64, storage),
+            sources: empty_buffer(device, "sources", 64 * kernels.len() as u64, storage),
             sample_count: kernels.len() as u32,
             samples_drawn: samples.weight.iter().filter(|w| **w > 0.0).count() as u64,
             triangle_count: asset.mesh_triangles.len() as u32,
@@ -103,6 +122,15 @@ impl AssetBuffers {
             grey: medium.is_grey(),
             medium: filled_buffer(device, "medium", &[medium], BufferUsages::UNIFORM),
         })
+    }
+}
+
+impl AssetBuffers {
+    /// Columns and rows of workgroups with 64 threads that give each sample one.
+    pub fn sample_groups(&self) -> [u32; 2] {
+        const ROW: u32 = 1024;
+        let groups = self.sample_count.div_ceil(64);
+        [groups.min(ROW), groups.div_ceil(ROW)]
     }
 }
 

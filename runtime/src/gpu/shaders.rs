@@ -25,6 +25,7 @@ pub(super) const LIGHTING: &str = source!(
     "shared/sh",
     "lighting"
 );
+pub(super) const SLOPES: &str = source!("shared/view", "shared/medium", "slopes");
 pub(super) const SPLAT: &str = source!(
     "shared/view",
     "shared/medium",

@@ -10,6 +10,7 @@ use wgpu::{
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Pass {
     Lighting,
+    Slopes,
     Surface,
     Boundary,
     Segments,
@@ -18,9 +19,13 @@ pub(super) enum Pass {
     Resolve,
 }
 
+/// Number of passes.
+pub(super) const PASSES: usize = Pass::ALL.len();
+
 impl Pass {
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 8] = [
         Self::Lighting,
+        Self::Slopes,
         Self::Surface,
         Self::Boundary,
         Self::Segments,
@@ -30,7 +35,7 @@ impl Pass {
     ];
 
     /// Names and milliseconds of the passes that ran.
-    pub fn named(milliseconds: &[f64; 7]) -> Vec<(&'static str, f64)> {
+    pub fn named(milliseconds: &[f64; PASSES]) -> Vec<(&'static str, f64)> {
         let times = Self::ALL.into_iter().zip(milliseconds);
         times
             .filter(|(_, ms)| **ms > 0.0)
@@ -41,6 +46,7 @@ impl Pass {
     pub fn name(self) -> &'static str {
         match self {
             Self::Lighting => "lighting",
+            Self::Slopes => "slopes",
             Self::Surface => "surface",
             Self::Boundary => "boundary",
             Self::Segments => "segments",
@@ -161,7 +167,7 @@ pub(super) struct Reading {
 
 impl Reading {
     /// Adds up ticks: milliseconds by pass, in the order of [`Pass::ALL`].
-    pub fn sum(&self, bytes: &[u8], milliseconds: &mut [f64; 7]) {
+    pub fn sum(&self, bytes: &[u8], milliseconds: &mut [f64; PASSES]) {
         for (passes, block) in self.passes.iter().zip(bytes.chunks_exact(BLOCK as usize)) {
             let tick = |i: usize| bytemuck::pod_read_unaligned::<u64>(&block[8 * i..8 * i + 8]);
             for (i, pass) in passes.iter().enumerate() {

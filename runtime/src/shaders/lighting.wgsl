@@ -2,13 +2,13 @@
 //
 //   v = albedo * sum over lights of p(cos) E psi boundary,   psi = exp(-ratio * decode(SH)) or exp(-extinction * m)
 
-@group(1) @binding(0) var<storage, read> samples: array<vec4f>;     // position, sharpness
+@group(1) @binding(0) var<storage, read> centroids: array<vec4f>;   // where values hold, largest slope
 @group(1) @binding(1) var<storage, read> weights: array<f32>;
 @group(1) @binding(2) var<storage, read> depth: array<f32>;         // order * order coefficients a sample
 @group(1) @binding(3) var<storage, read> boundary: array<f32>;      // as depth; only where ior is not 1
 @group(1) @binding(4) var<storage, read> lights: array<Light>;
 @group(1) @binding(5) var<storage, read> exact: array<vec2f>;       // [table][sample]: density length, boundary
-@group(1) @binding(6) var<storage, read_write> sources: array<vec4f>; // v, weight
+@group(1) @binding(6) var<storage, read_write> values: array<vec4f>; // v, weight
 @group(1) @binding(7) var<uniform> recurrence: array<vec4f, 100>;
 
 override FRESNEL: bool = false;
@@ -69,10 +69,10 @@ fn light_samples(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgrou
     }
     let weight = weights[sample];
     if (weight <= 0.0) {
-        sources[sample] = vec4f(0.0);
+        values[sample] = vec4f(0.0);
         return;
     }
-    let x = samples[sample].xyz;
+    let x = centroids[sample].xyz;
     let away = view.origin - x;
     let distance = length(away);
     var towards_camera = vec3f(0.0);
@@ -100,5 +100,5 @@ fn light_samples(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgrou
         let phase = henyey_greenstein(medium.mean_cosine, -dot(arriving.towards, towards_camera));
         sum += arriving.irradiance * psi * phase;
     }
-    sources[sample] = vec4f(medium.albedo * sum, weight);
+    values[sample] = vec4f(medium.albedo * sum, weight);
 }

@@ -4,12 +4,14 @@ override GREY: bool = true;             // all channels have the same extinction
 override HETEROGENEOUS: bool = false;   // the medium has a density profile
 
 @group(1) @binding(0) var<storage, read> samples: array<vec4f>; // position, sharpness
-@group(1) @binding(1) var<storage, read> sources: array<vec4f>; // v, weight
+@group(1) @binding(1) var<storage, read> sources: array<vec4f>; // SOURCE a sample: v, weight; slopes
 @group(1) @binding(2) var<storage, read> piece: array<vec4f>;
 @group(1) @binding(3) var<storage, read> profile: array<vec2f>;
 // Least start and greatest end of the current piece over 8 x 8 pixels: kernels that no ray meets draw nothing.
 @group(1) @binding(4) var<storage, read> cells: array<vec2f>;
 
+const SOURCE: u32 = 4u;
+const MOST_EXPONENT: f32 = 4.0;
 const CELL: u32 = 8u;
 const MOST_CELLS: u32 = 64u;
 
@@ -17,6 +19,9 @@ struct Splat {
     @builtin(position) position: vec4f,
     @location(0) @interpolate(flat) centre: vec4f, // as seen from the camera, sharpness
     @location(1) @interpolate(flat) source: vec4f, // v, weight
+    @location(2) @interpolate(flat) slope_r: vec3f,
+    @location(3) @interpolate(flat) slope_g: vec3f,
+    @location(4) @interpolate(flat) slope_b: vec3f,
 }
 
 struct Sums {
@@ -93,7 +98,7 @@ fn may_meet(outline: Outline, unit: vec2f, low: f32, high: f32) -> bool {
 @vertex
 fn outline(@builtin(vertex_index) corner: u32, @builtin(instance_index) index: u32) -> Splat {
     let sample = samples[index];
-    let source = sources[index];
+    let source = sources[SOURCE * index];
     let centre = sample.xyz - view.origin;
     let radius = 1.0001 * CUT_OFF_RADIUS / sample.w;
     var position = vec4f(2.0, 2.0, 0.0, 1.0);
@@ -108,7 +113,9 @@ fn outline(@builtin(vertex_index) corner: u32, @builtin(instance_index) index: u
         }
     }
     position.z = 0.0;
-    return Splat(position, vec4f(centre, sample.w), source);
+    let slopes = SOURCE * index + 1u;
+    return Splat(position, vec4f(centre, sample.w), source,
+        sources[slopes].xyz, sources[slopes + 1u].xyz, sources[slopes + 2u].xyz);
 }
 
 @fragment
@@ -144,11 +151,20 @@ fn add(in: Splat) -> Sums {
         path.scattering = slope.y;
     }
     let long = a * (whole.y - whole.x) >= LEAST_WIDTHS;
-    var w = vec3f(kernel_weight(a, d2, path, medium.kappa.x, long));
+    let red = kernel_weight(a, d2, path, medium.kappa.x, long);
+    var w = vec3f(red.x);
+    var mean = vec3f(red.y);
     if (!GREY) {
-        w.y = kernel_weight(a, d2, path, medium.kappa.y, long);
-        w.z = kernel_weight(a, d2, path, medium.kappa.z, long);
+        let green = kernel_weight(a, d2, path, medium.kappa.y, long);
+        let blue = kernel_weight(a, d2, path, medium.kappa.z, long);
+        w = vec3f(red.x, green.x, blue.x);
+        mean = vec3f(red.y, green.y, blue.y);
     }
     w *= in.source.w;
-    return Sums(vec4f(in.source.xyz * w, 1.0), vec4f(w, 0.0));
+    // The source's mean under the weight: it grows exponentially from the kernel's centre.
+    let rise = -vec3f(dot(in.slope_r, across), dot(in.slope_g, across), dot(in.slope_b, across));
+    let slope = vec3f(dot(in.slope_r, direction), dot(in.slope_g, direction), dot(in.slope_b, direction));
+    let exponent = rise + slope * (mean + 0.25 / (a * a) * slope);
+    let value = in.source.xyz * exp(clamp(exponent, vec3f(-MOST_EXPONENT), vec3f(MOST_EXPONENT)));
+    return Sums(vec4f(value * w, 1.0), vec4f(w, 0.0));
 }

@@ -119,6 +119,7 @@ impl Object {
         let mut samples = Samples::default();
         for p in &points {
             let x = p.as_dvec3();
+            samples.offset.push([0; 4]);
             samples.position_radius.push([p.x, p.y, p.z, 0.55 * self.spacing]);
             samples
                 .weight

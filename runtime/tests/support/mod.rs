@@ -102,6 +102,7 @@ pub fn ball(spacing: f64, centre: DVec3, phase: Phase) -> Asset {
             coefficients.iter_mut().zip(y).for_each(|(c, y)| *c += value * y);
         }
         let q = p.as_vec3();
+        samples.offset.push([0; 4]);
         samples.position_radius.push([q.x, q.y, q.z, spacing as f32]);
         samples.weight.push(1.0);
         samples.depth.extend(coefficients.map(|c| c as f32));

@@ -1,4 +1,4 @@
-//! The lighting pass: the source of every sample, once a frame.
+//! The lighting pass: the value of every sample, once a frame.
 
 use super::super::bindings::{Slot, compute, group, layout, pipeline_layout};
 use super::super::scene::{AssetBuffers, FrameBuffers};
@@ -6,9 +6,6 @@ use super::super::shaders;
 use super::super::timers::Pass;
 use super::Recorder;
 use wgpu::{BindGroup, BindGroupLayout, ComputePipeline, Device, ShaderStages};
-
-/// Workgroups in a row; more samples make more rows.
-const ROW: u32 = 1024;
 
 /// See lighting.wgsl.
 pub(crate) struct Lighting {
@@ -30,13 +27,13 @@ impl Lighting {
 
     pub fn bind(&self, device: &Device, asset: &AssetBuffers, frame: &FrameBuffers) -> BindGroup {
         let resources = [
-            &asset.samples,
+            &asset.centroids,
             &asset.weights,
             &asset.depth,
             &asset.boundary,
             &frame.lights,
             &frame.exact,
-            &asset.sources,
+            &asset.values,
             &asset.recurrence,
         ];
         group(
@@ -48,10 +45,9 @@ impl Lighting {
     }
 
     pub fn record(&self, r: &mut Recorder, group: &BindGroup, asset: &AssetBuffers) {
-        let groups = asset.sample_count.div_ceil(64);
-        let rows = groups.div_ceil(ROW);
         r.compute(Pass::Lighting, &self.pipeline, group, |pass| {
-            pass.dispatch_workgroups(groups.min(ROW), rows, 1);
+            let [columns, rows] = asset.sample_groups();
+            pass.dispatch_workgroups(columns, rows, 1);
         });
     }
 }

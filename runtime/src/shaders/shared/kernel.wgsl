@@ -75,8 +75,8 @@ fn error_function(value: f32) -> f32 {
     return x * p / q;
 }
 
-// The same as kernel_integral * e^-before in fewer steps, for kappa <= a and pieces that are not tiny.
-fn mild_integral(a: f32, d2: f32, s: f32, length: f32, kappa: f32, before: f32) -> f32 {
+// The same as kernel_integral * e^-before and mean_offset in fewer steps, for kappa <= a and pieces that are not tiny.
+fn mild_integral(a: f32, d2: f32, s: f32, length: f32, kappa: f32, before: f32) -> vec2f {
     let inverse = 1.0 / a;
     let half = 0.5 * kappa * inverse;
     let u0 = a * s;
@@ -87,7 +87,22 @@ fn mild_integral(a: f32, d2: f32, s: f32, length: f32, kappa: f32, before: f32) 
     let series = 1.0 - y * (0.5 - y * (1.0 / 6.0 - y * (1.0 / 24.0 - y * (1.0 / 120.0))));
     let mean = select((1.0 - exp(-y)) / max(y, 0.1), series, y < 0.2);
     let cut = CUT_OFF_VALUE * length * mean * exp(-before);
-    return max(HALF_ROOT_PI * inverse * scale * (error_function(x1) - error_function(x0)) - cut, 0.0);
+    let whole = HALF_ROOT_PI * inverse * scale * (error_function(x1) - error_function(x0));
+    let u1 = u0 + a * length;
+    let ends = exp(-a * a * d2 - u0 * u0 - before) - exp(-a * a * d2 - u1 * u1 - y - before);
+    let offset = inverse * (0.5 * inverse * ends / max(whole, 1e-30) - half);
+    return vec2f(max(whole - cut, 0.0), clamp(offset, s, s + length));
+}
+
+// Mean distance from the closest approach under the attenuated Gaussian, given the integral of the same arguments.
+fn mean_offset(a: f32, d2: f32, s: f32, length: f32, kappa: f32, integral: f32) -> f32 {
+    let u0 = a * s;
+    let u1 = a * (s + length);
+    let ad2 = a * a * d2;
+    let ends = exp(-ad2 - u0 * u0) - exp(-ad2 - u1 * u1 - kappa * length);
+    let whole = integral + CUT_OFF_VALUE * length * decay_mean(kappa * length);
+    let offset = (0.5 / a * ends / max(whole, 1e-30) - kappa / (2.0 * a)) / a;
+    return clamp(offset, s, s + length);
 }
 
 // A kernel's support along a ray, inside a piece.
@@ -102,14 +117,17 @@ struct Path {
 // Pieces shorter than this many kernel widths 1/a take the general form.
 const LEAST_WIDTHS: f32 = 0.1;
 
-// Weight of a kernel without its own factor w, for the extinction `kappa` of one channel.
-fn kernel_weight(a: f32, d2: f32, path: Path, kappa: f32, long: bool) -> f32 {
+// Weight of a kernel without its own factor w, for the extinction `kappa` of one channel, and the mean distance from
+// the closest approach under it.
+fn kernel_weight(a: f32, d2: f32, path: Path, kappa: f32, long: bool) -> vec2f {
     let here = kappa * path.density;
-    var weight = 0.0;
+    var weight = vec2f(0.0);
     if (long && here <= a) {
         weight = mild_integral(a, d2, path.s, path.length, here, kappa * path.before);
     } else {
-        weight = exp(-kappa * path.before) * kernel_integral(a, d2, path.s, path.length, here);
+        let g = kernel_integral(a, d2, path.s, path.length, here);
+        let mean = mean_offset(a, d2, path.s, path.length, here, g);
+        weight = vec2f(exp(-kappa * path.before) * g, mean);
     }
-    return weight * path.scattering;
+    return vec2f(weight.x * path.scattering, weight.y);
 }

@@ -1,0 +1,47 @@
+// Slopes pass: how each sample's source varies around it, from its neighbours' values. Twin of formats/src/slopes.rs,
+// which states the formulas.
+
+@group(1) @binding(0) var<storage, read> samples: array<vec4f>;   // position, sharpness
+@group(1) @binding(1) var<storage, read> centroids: array<vec4f>; // where values hold, largest slope
+@group(1) @binding(2) var<storage, read> spokes: array<vec4f>;    // NEIGHBOURS a sample: gradient, index (bits)
+@group(1) @binding(3) var<storage, read> values: array<vec4f>;    // v at the centroid, weight
+// SOURCE a sample: v at the kernel's centre and weight, then the slope of each channel.
+@group(1) @binding(4) var<storage, read_write> sources: array<vec4f>;
+
+const NEIGHBOURS: u32 = 14u;
+const SOURCE: u32 = 4u;
+const MOST_RATIO: f32 = 6.0;
+const MOST_EXPONENT: f32 = 4.0;
+
+@compute @workgroup_size(64)
+fn find_slopes(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) groups: vec3u) {
+    let sample = id.y * groups.x * 64u + id.x;
+    if (sample >= medium.samples) {
+        return;
+    }
+    let own = values[sample];
+    let centroid = centroids[sample];
+    let to_centre = samples[sample].xyz - centroid.xyz;
+    var value = own.xyz;
+    for (var c = 0u; c < 3u; c++) {
+        var slope = vec3f(0.0);
+        if (own[c] > 0.0) {
+            for (var k = 0u; k < NEIGHBOURS; k++) {
+                let spoke = spokes[sample * NEIGHBOURS + k];
+                let ratio = values[bitcast<u32>(spoke.w)][c] / own[c];
+                var logarithm = -MOST_RATIO;
+                if (ratio > 0.0) {
+                    logarithm = clamp(log(ratio), -MOST_RATIO, MOST_RATIO);
+                }
+                slope += spoke.xyz * logarithm;
+            }
+            let size = length(slope);
+            if (size > centroid.w) {
+                slope *= centroid.w / size;
+            }
+            value[c] *= exp(clamp(dot(slope, to_centre), -MOST_EXPONENT, MOST_EXPONENT));
+        }
+        sources[SOURCE * sample + 1u + c] = vec4f(slope, 0.0);
+    }
+    sources[SOURCE * sample] = vec4f(value, own.w);
+}
