@@ -3,10 +3,10 @@
 use super::image::BackendName;
 use super::output::{say, tell, warn};
 use super::progress::Display;
-use super::{Inputs, make_folder};
+use super::{Inputs, check_folder, make_folder};
 use diaphane_bake::params::{Params, Preset};
 use diaphane_bake::{Input, bake};
-use diaphane_formats::{asset, files, mesh};
+use diaphane_formats::{asset, mesh};
 use diaphane_runtime::player::LightMode;
 use std::path::PathBuf;
 use std::time::Instant;
@@ -50,8 +50,8 @@ struct Line {
 /// Bakes, plays and checks.
 pub fn run(a: &Arguments) -> anyhow::Result<bool> {
     let start = Instant::now();
+    check_folder(&a.output_dir)?;
     make_folder(&a.output_dir)?;
-    files::require_writable(&a.output_dir.join("report.html"))?;
     let written = diaphane_assets::write_all(&a.output_dir.join("inputs"))?;
     let mut cases = Vec::new();
     let mut lines = Vec::new();

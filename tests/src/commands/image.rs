@@ -3,7 +3,7 @@
 use super::compare::print_metrics;
 use super::output::{say, tell, warn};
 use super::progress::Display;
-use super::{Inputs, make_folder};
+use super::{Inputs, check_folder, make_folder};
 use clap::ValueEnum;
 use diaphane_formats::asset::{self, Asset};
 use diaphane_formats::files;
@@ -111,9 +111,9 @@ pub fn run(a: &Arguments) -> anyhow::Result<bool> {
         a.inputs.require_different(&output)?;
         files::require_different(&output, &a.asset)?;
     }
+    check_folder(&a.output_dir)?;
     let mut played = play(&asset, &loaded.scene, a.backend.into(), a.light.into(), 1)?;
     make_folder(&a.output_dir)?;
-    files::require_writable(&a.output_dir.join("report.html"))?;
     played.warnings.extend(loaded.warnings);
     if !same_object(&asset, &loaded.mesh) {
         played.warnings.push(

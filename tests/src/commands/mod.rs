@@ -69,6 +69,30 @@ pub fn make_folder(path: &Path) -> anyhow::Result<()> {
     std::fs::create_dir_all(path).with_context(|| format!("cannot make the folder '{}'", path.display()))
 }
 
+/// Fails early when [`make_folder`] would: something else is in the way, or the place takes no files.
+pub fn check_folder(path: &Path) -> anyhow::Result<()> {
+    // The empty path that ends a relative one stands for the current folder.
+    let real = |p: &Path| {
+        if p.as_os_str().is_empty() {
+            PathBuf::from(".")
+        } else {
+            p.to_path_buf()
+        }
+    };
+    let found = path
+        .ancestors()
+        .map(real)
+        .find(|p| p.exists())
+        .unwrap_or_else(|| PathBuf::from("."));
+    anyhow::ensure!(
+        found.is_dir(),
+        "'{}' cannot be a folder: '{}' is a file",
+        path.display(),
+        found.display()
+    );
+    Ok(files::require_writable(&found.join("report.html"))?)
+}
+
 /// Text without line breaks.
 pub fn one_line(text: &str) -> String {
     text.split_whitespace().collect::<Vec<_>>().join(" ")

@@ -51,7 +51,7 @@ struct Cell {
 /// The position of `u` (0..1) in a homogeneous medium; `None` where nothing is inside.
 pub fn in_homogeneous(kappa: DVec3, rho: f64, stretches: &[Stretch], u: f64) -> Option<Position> {
     let total: f64 = stretches.iter().map(|s| s.end - s.start).sum();
-    if !(total > 0.0) {
+    if total <= 0.0 {
         return None;
     }
     let (s, density) = invert(kappa * rho, total, u);
@@ -138,7 +138,7 @@ pub fn in_field(
         .cells
         .iter()
         .fold((0.0, 0.0), |(a, b), c| (a + c.seen, b + c.scattering));
-    if !(scattering > 0.0) {
+    if scattering <= 0.0 {
         return None;
     }
     // Where exp(-τ) underflows for every cell, only the uniform part is left.

@@ -26,8 +26,7 @@ fn isolate(c: &[f64], out: &mut [f64; 4]) -> usize {
     let value = |t: f64| c.iter().rev().fold(0.0, |sum, v| sum * t + v);
     let mut n = 0;
     let mut low = -bound;
-    for i in 0..=turns {
-        let high = if i < turns { turning[i] } else { bound };
+    for high in turning[..turns].iter().copied().chain([bound]) {
         let sign = value(low) < 0.0;
         if sign != (value(high) < 0.0) && n < 4 {
             out[n] = bisect(low, high, |t| (value(t) < 0.0) == sign);
