@@ -5,7 +5,7 @@ use super::pipeline::Pipeline;
 use super::readback;
 use super::targets::Targets;
 use super::tiles::Tile;
-use super::timers::{Pass, Timers, PASSES};
+use super::timers::{PASSES, Pass, Timers};
 use crate::exact::ExactDepths;
 use crate::frame::Frame;
 use crate::rendered::{Counters, MAX_PIECES, RayResult, Rendered};

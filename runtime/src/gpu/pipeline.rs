@@ -3,10 +3,10 @@
 use super::passes::Recorder;
 use super::passes::boundary::Boundary;
 use super::passes::lighting::Lighting;
-use super::passes::slopes::Slopes;
 use super::passes::profile::Profile;
 use super::passes::resolve::Resolve;
 use super::passes::segments::Segments;
+use super::passes::slopes::Slopes;
 use super::passes::splat::Splat;
 use super::passes::surface::Surface;
 use super::scene::{AssetBuffers, FrameBuffers, VIEW_STRIDE, common_layout};

@@ -7,7 +7,7 @@ use super::passes::publish::Publish;
 use super::pipeline::Pipeline;
 use super::readback;
 use super::targets::SUM_FORMAT;
-use super::timers::{Pass, Reading, Timers, PASSES};
+use super::timers::{PASSES, Pass, Reading, Timers};
 use crate::exact::ExactDepths;
 use crate::frame::Frame;
 use crate::rendered::Counters;

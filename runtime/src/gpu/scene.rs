@@ -58,8 +58,12 @@ impl AssetBuffers {
             .map(|&[x, y, z, radius]| [x, y, z, kernel::sharpness(radius, info.width_factor)])
             .collect();
         let stencil = slope_stencil(asset, &samples);
-        let centroids: Vec<[f32; 4]> =
-            stencil.centroid.iter().zip(&stencil.limit).map(|(c, limit)| c.extend(*limit).to_array()).collect();
+        let centroids: Vec<[f32; 4]> = stencil
+            .centroid
+            .iter()
+            .zip(&stencil.limit)
+            .map(|(c, limit)| c.extend(*limit).to_array())
+            .collect();
         let spokes: Vec<[f32; 4]> = stencil
             .spokes
             .as_flattened()

@@ -47,6 +47,9 @@ pub struct Args {
     /// Write counts and timings as JSON to this file
     #[arg(long, value_name = "S.json", requires = "output")]
     pub stats: Option<PathBuf>,
+    /// Open the window, draw N frames, save what it shows to FILE.png and quit: for tests
+    #[arg(long, num_args = 2, value_names = ["N", "FILE.png"], conflicts_with = "output")]
+    pub screenshot_after: Option<Vec<String>>,
 }
 
 /// [`Backend`] on the command line.

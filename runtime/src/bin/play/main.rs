@@ -3,11 +3,12 @@
 mod args;
 mod headless;
 mod stats;
+#[cfg(feature = "window")]
+mod window;
 
 use anyhow::Result;
 use args::Args;
 use clap::Parser;
-use std::path::Path;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
@@ -15,7 +16,7 @@ fn main() -> ExitCode {
     let args = Args::parse();
     let done = match &args.output {
         Some(output) => headless::run(&args, output),
-        None => open_window(&args.asset),
+        None => open_window(&args),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,
@@ -27,6 +28,12 @@ fn main() -> ExitCode {
     }
 }
 
-fn open_window(_asset: &Path) -> Result<()> {
+#[cfg(feature = "window")]
+fn open_window(args: &Args) -> Result<()> {
+    window::run(args)
+}
+
+#[cfg(not(feature = "window"))]
+fn open_window(_args: &Args) -> Result<()> {
     anyhow::bail!("this build has no window; name a picture to draw with --output")
 }

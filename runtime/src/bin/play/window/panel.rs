@@ -1,0 +1,299 @@
+//! The side panel: what it shows of a session and what it changes in it.
+
+use diaphane_formats::scene::{Light, Scene};
+use diaphane_runtime::gpu::Statistics;
+use diaphane_runtime::player::LightMode;
+use egui::{CollapsingHeader, DragValue, Grid, RichText, Slider, Ui};
+use glam::DVec3;
+
+/// Points across.
+pub const WIDTH: f32 = 300.0;
+
+/// What the panel works on.
+pub struct Session<'a> {
+    pub scene: &'a mut Scene,
+    pub fov_degrees: &'a mut f64,
+    pub exposure: &'a mut f32,
+    pub mode: &'a mut LightMode,
+    /// Whether the surface reflects at all.
+    pub refracts: bool,
+    /// The object's middle and diagonal, for new lights and the speed of dragging.
+    pub centre: DVec3,
+    pub diagonal: f64,
+    pub numbers: Numbers<'a>,
+    /// The last thing that happened.
+    pub message: &'a str,
+}
+
+/// What the panel reports.
+pub struct Numbers<'a> {
+    pub adapter: &'a str,
+    pub frame_ms: f64,
+    pub size: [u32; 2],
+    pub rays: u32,
+    pub rays_wanted: u32,
+    pub samples: u64,
+    pub statistics: &'a Statistics,
+}
+
+/// Buttons.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Action {
+    SavePng,
+    SaveExr,
+    MeasureExposure,
+    ResetCamera,
+}
+
+/// Draws the panel; returns the button that was pressed.
+pub fn show(ui: &mut Ui, session: &mut Session) -> Option<Action> {
+    let mut action = None;
+    egui::ScrollArea::vertical().show(ui, |ui| {
+        ui.heading("diaphane");
+        statistics(ui, &session.numbers);
+        ui.separator();
+        action = picture(ui, session);
+        ui.separator();
+        lights(ui, session);
+    });
+    action
+}
+
+fn statistics(ui: &mut Ui, numbers: &Numbers) {
+    let counters = &numbers.statistics.counters;
+    ui.label(RichText::new(numbers.adapter).small());
+    Grid::new("statistics").num_columns(2).show(ui, |ui| {
+        let mut row = |name: &str, value: String| {
+            ui.label(name);
+            ui.monospace(value);
+            ui.end_row();
+        };
+        row(
+            "frames / s",
+            format!("{:.1}", 1000.0 / numbers.frame_ms.max(1e-3)),
+        );
+        row("picture", format!("{} x {}", numbers.size[0], numbers.size[1]));
+        row(
+            "rays a pixel",
+            format!("{} of {}", numbers.rays, numbers.rays_wanted),
+        );
+        row(
+            "samples",
+            format!("{} of {}", counters.samples_drawn, numbers.samples),
+        );
+        row("splats a ray", format!("{:.1}", counters.splats_per_ray()));
+        if counters.pieces_dropped > 0 {
+            row("pieces not drawn", counters.pieces_dropped.to_string());
+        }
+    });
+    CollapsingHeader::new("Passes, ms a ray")
+        .default_open(true)
+        .show(ui, |ui| {
+            if numbers.statistics.passes.is_empty() {
+                ui.label("this adapter has no clock");
+            }
+            Grid::new("passes").num_columns(2).show(ui, |ui| {
+                for (name, ms) in &numbers.statistics.passes {
+                    ui.label(*name);
+                    ui.monospace(format!("{ms:8.2}"));
+                    ui.end_row();
+                }
+            });
+        });
+}
+
+fn picture(ui: &mut Ui, session: &mut Session) -> Option<Action> {
+    let mut action = None;
+    ui.horizontal(|ui| {
+        // In photographic stops: a factor of two each.
+        let mut stops = session.exposure.max(1e-12).log2();
+        if ui
+            .add(Slider::new(&mut stops, -12.0..=12.0).text("exposure"))
+            .changed()
+        {
+            *session.exposure = stops.exp2();
+        }
+        if ui.button("auto").clicked() {
+            action = Some(Action::MeasureExposure);
+        }
+    });
+    ui.horizontal(|ui| {
+        ui.add(
+            Slider::new(session.fov_degrees, 5.0..=120.0)
+                .text("field of view")
+                .suffix("°"),
+        );
+        if ui
+            .button("reset")
+            .on_hover_text("Back to the first camera")
+            .clicked()
+        {
+            action = Some(Action::ResetCamera);
+        }
+    });
+    if session.refracts {
+        let surface = &mut session.scene.surface;
+        ui.checkbox(&mut surface.reflection, "reflection");
+        ui.add_enabled(
+            surface.reflection,
+            Slider::new(&mut surface.specular, 0.0..=2.0).text("strength"),
+        );
+        ui.add_enabled(
+            surface.reflection,
+            Slider::new(&mut surface.roughness, 0.05..=1.0).text("roughness"),
+        );
+    }
+    ui.horizontal(|ui| {
+        ui.label("depth to lights:");
+        for (mode, name) in [
+            (LightMode::Auto, "auto"),
+            (LightMode::Baked, "baked"),
+            (LightMode::Exact, "exact"),
+        ] {
+            ui.selectable_value(session.mode, mode, name);
+        }
+    });
+    ui.horizontal(|ui| {
+        if ui.button("Save PNG").clicked() {
+            action = Some(Action::SavePng);
+        }
+        if ui.button("Save EXR").clicked() {
+            action = Some(Action::SaveExr);
+        }
+    });
+    ui.label(RichText::new(session.message).small());
+    ui.label(RichText::new("drag: turn   right drag: move   wheel: distance").small());
+    action
+}
+
+fn lights(ui: &mut Ui, session: &mut Session) {
+    let speed = 0.005 * session.diagonal;
+    let mut gone = None;
+    for (i, light) in session.scene.lights.iter_mut().enumerate() {
+        let title = format!("Light {}: {}", i + 1, kind(light));
+        CollapsingHeader::new(title)
+            .id_salt(("light", i))
+            .default_open(i == 0)
+            .show(ui, |ui| {
+                edit(ui, light, speed);
+                if ui.button("remove").clicked() {
+                    gone = Some(i);
+                }
+            });
+    }
+    if let Some(i) = gone {
+        session.scene.lights.remove(i);
+    }
+    if session.scene.environment.is_some() {
+        ui.label("and the scene's environment");
+    }
+    ui.horizontal(|ui| {
+        ui.label("add:");
+        let away = session.diagonal;
+        let position = session.centre + DVec3::new(away, away, away);
+        let direction = -DVec3::ONE.normalize();
+        let intensity = DVec3::splat(4.0 * 3.0 * away * away);
+        if ui.button("point").clicked() {
+            session.scene.lights.push(Light::Point { position, intensity });
+        }
+        if ui.button("directional").clicked() {
+            session.scene.lights.push(Light::Directional {
+                direction,
+                irradiance: DVec3::splat(4.0),
+            });
+        }
+        if ui.button("spot").clicked() {
+            let (cos_inner, cos_outer) = (10f64.to_radians().cos(), 15f64.to_radians().cos());
+            session.scene.lights.push(Light::Spot {
+                position,
+                direction,
+                intensity,
+                cos_inner,
+                cos_outer,
+            });
+        }
+    });
+}
+
+fn kind(light: &Light) -> &'static str {
+    match light {
+        Light::Point { .. } => "point",
+        Light::Directional { .. } => "directional",
+        Light::Spot { .. } => "spot",
+    }
+}
+
+fn edit(ui: &mut Ui, light: &mut Light, speed: f64) {
+    match light {
+        Light::Point { position, intensity } => {
+            vector(ui, "position", position, speed);
+            colour(ui, "intensity", intensity);
+        }
+        Light::Directional {
+            direction,
+            irradiance,
+        } => {
+            heading(ui, direction);
+            colour(ui, "irradiance", irradiance);
+        }
+        Light::Spot {
+            position,
+            direction,
+            intensity,
+            cos_inner,
+            cos_outer,
+        } => {
+            vector(ui, "position", position, speed);
+            heading(ui, direction);
+            colour(ui, "intensity", intensity);
+            let (mut inner, mut outer) = (cos_inner.acos().to_degrees(), cos_outer.acos().to_degrees());
+            let a = ui.add(Slider::new(&mut inner, 0.0..=90.0).text("inner angle"));
+            let b = ui.add(Slider::new(&mut outer, 0.0..=90.0).text("outer angle"));
+            if a.changed() || b.changed() {
+                *cos_inner = inner.to_radians().cos();
+                *cos_outer = outer.max(inner).to_radians().cos();
+            }
+        }
+    }
+}
+
+fn vector(ui: &mut Ui, name: &str, value: &mut DVec3, speed: f64) -> bool {
+    let mut changed = false;
+    ui.horizontal(|ui| {
+        for v in [&mut value.x, &mut value.y, &mut value.z] {
+            changed |= ui.add(DragValue::new(v).speed(speed).max_decimals(3)).changed();
+        }
+        ui.label(name);
+    });
+    changed
+}
+
+/// A direction stays a unit vector.
+fn heading(ui: &mut Ui, direction: &mut DVec3) {
+    let mut value = *direction;
+    if vector(ui, "direction", &mut value, 0.01) {
+        *direction = value.try_normalize().unwrap_or(*direction);
+    }
+}
+
+/// Strength, and colour with its brightest channel at 1.
+fn colour(ui: &mut Ui, name: &str, value: &mut DVec3) {
+    let mut strength = value.max_element();
+    let unit = if strength > 0.0 {
+        *value / strength
+    } else {
+        DVec3::ONE
+    };
+    let mut rgb = unit.as_vec3().to_array();
+    ui.horizontal(|ui| {
+        let a = ui.color_edit_button_rgb(&mut rgb);
+        // Never quite 0, so that the colour is not forgotten.
+        let speed = 0.01 * strength.max(0.01);
+        let drag = DragValue::new(&mut strength).speed(speed).range(1e-9..=1e9);
+        let b = ui.add(drag);
+        ui.label(name);
+        if a.changed() || b.changed() {
+            *value = DVec3::from_array(rgb.map(f64::from)) * strength;
+        }
+    });
+}

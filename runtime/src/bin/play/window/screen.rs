@@ -1,0 +1,228 @@
+//! The window's surface and what is drawn on it: the picture on the left, the panel over it.
+
+use anyhow::{Context, Result, anyhow};
+use diaphane_formats::asset::Asset;
+use diaphane_runtime::Error;
+use diaphane_runtime::gpu::{GpuDevice, Renderer, Request, instance, read_texture};
+use egui::{ClippedPrimitive, TexturesDelta};
+use egui_wgpu::{RendererOptions, ScreenDescriptor};
+use std::sync::Arc;
+use wgpu::{
+    Color, CommandEncoder, CurrentSurfaceTexture, Extent3d, LoadOp, Operations, PollType, PresentMode,
+    RenderPassColorAttachment, RenderPassDescriptor, StoreOp, Surface, SurfaceConfiguration, Texture,
+    TextureDescriptor, TextureDimension, TextureFormat, TextureUsages, TextureView,
+};
+use winit::window::Window;
+
+/// Formats of one byte a channel; those without sRGB's curve first, because egui mixes encoded colours.
+const FORMATS: [TextureFormat; 4] = [
+    TextureFormat::Bgra8Unorm,
+    TextureFormat::Rgba8Unorm,
+    TextureFormat::Bgra8UnormSrgb,
+    TextureFormat::Rgba8UnormSrgb,
+];
+
+/// Device, surface and both renderers.
+pub struct Screen {
+    pub window: Arc<Window>,
+    pub gpu: GpuDevice,
+    pub renderer: Renderer,
+    surface: Surface<'static>,
+    config: SurfaceConfiguration,
+    panel: egui_wgpu::Renderer,
+}
+
+/// What one frame shows.
+pub struct Painting<'a> {
+    /// Rays to draw first; `None` shows the picture that is there.
+    pub request: Option<Request<'a>>,
+    /// Factor on its radiance.
+    pub exposure: f32,
+    /// Left, top, width and height of the picture in the window, pixels.
+    pub place: [f32; 4],
+    /// The panel.
+    pub textures: TexturesDelta,
+    pub jobs: Vec<ClippedPrimitive>,
+    pub pixels_per_point: f32,
+    /// Whether to read back what the window shows.
+    pub capture: bool,
+}
+
+/// What the window showed: columns, rows, RGB bytes.
+pub type Capture = (usize, usize, Vec<u8>);
+
+impl Screen {
+    /// Opens the best adapter that can show pictures in this window.
+    ///
+    /// # Errors
+    /// No such adapter; an asset that does not fit it.
+    pub fn new(window: Arc<Window>, asset: &Asset) -> Result<Self> {
+        let instance = instance();
+        let surface = instance
+            .create_surface(Arc::clone(&window))
+            .map_err(|_| Error::NoAdapter("no driver can draw on this window".to_owned()))?;
+        let gpu = GpuDevice::open(&instance, Some(&surface))?;
+        let formats = surface.get_capabilities(&gpu.adapter).formats;
+        let format = FORMATS
+            .into_iter()
+            .find(|f| formats.contains(f))
+            .context("the window offers no format of one byte a channel")?;
+        let size = window.inner_size();
+        let mut config = surface
+            .get_default_config(&gpu.adapter, size.width.max(1), size.height.max(1))
+            .context("the adapter cannot show pictures in this window")?;
+        config.format = format;
+        config.present_mode = PresentMode::AutoVsync;
+        surface.configure(&gpu.device, &config);
+        let renderer = Renderer::new(&gpu.device, &gpu.queue, asset, format)?;
+        let panel = egui_wgpu::Renderer::new(&gpu.device, format, RendererOptions::default());
+        gpu.check()?;
+        Ok(Self {
+            window,
+            gpu,
+            renderer,
+            surface,
+            config,
+            panel,
+        })
+    }
+
+    /// Follows the window's size.
+    pub fn resize(&mut self, width: u32, height: u32) {
+        let side = self.gpu.device.limits().max_texture_dimension_2d;
+        (self.config.width, self.config.height) = (width.clamp(1, side), height.clamp(1, side));
+        self.surface.configure(&self.gpu.device, &self.config);
+    }
+
+    /// Columns and rows of the surface.
+    pub fn size(&self) -> [u32; 2] {
+        [self.config.width, self.config.height]
+    }
+
+    /// Draws a frame and waits for it. `Ok(None)` where nothing was to be captured.
+    ///
+    /// # Errors
+    /// The GPU failed.
+    pub fn paint(&mut self, painting: Painting) -> Result<Option<Capture>> {
+        let (device, queue) = (&self.gpu.device, &self.gpu.queue);
+        let mut encoder = device.create_command_encoder(&Default::default());
+        match &painting.request {
+            Some(request) => self.renderer.prepare(device, queue, &mut encoder, request)?,
+            None => self.renderer.expose(queue, painting.exposure),
+        }
+        let descriptor = ScreenDescriptor {
+            size_in_pixels: [self.config.width, self.config.height],
+            pixels_per_point: painting.pixels_per_point,
+        };
+        for (id, deltas) in &painting.textures.set {
+            for delta in deltas {
+                self.panel.update_texture(device, queue, *id, delta);
+            }
+        }
+        let jobs = &painting.jobs;
+        // Command buffers come back only from paint callbacks, which the panel does not use.
+        let _ = self
+            .panel
+            .update_buffers(device, queue, &mut encoder, jobs, &descriptor);
+        let shown = match self.surface.get_current_texture() {
+            CurrentSurfaceTexture::Success(t) | CurrentSurfaceTexture::Suboptimal(t) => Some(t),
+            CurrentSurfaceTexture::Outdated | CurrentSurfaceTexture::Lost => {
+                self.surface.configure(&self.gpu.device, &self.config);
+                None
+            }
+            CurrentSurfaceTexture::Timeout | CurrentSurfaceTexture::Occluded => None,
+            CurrentSurfaceTexture::Validation => return Err(anyhow!("the window's surface failed")),
+        };
+        if let Some(frame) = &shown {
+            let view = frame.texture.create_view(&Default::default());
+            self.compose(&mut encoder, &view, painting.place, jobs, &descriptor);
+        }
+        let copy = painting.capture.then(|| self.offscreen());
+        if let Some(copy) = &copy {
+            let view = copy.create_view(&Default::default());
+            self.compose(&mut encoder, &view, painting.place, jobs, &descriptor);
+        }
+        self.gpu.queue.submit([encoder.finish()]);
+        for id in &painting.textures.free {
+            self.panel.free_texture(id);
+        }
+        if let Some(frame) = shown {
+            self.window.pre_present_notify();
+            self.gpu.queue.present(frame);
+        }
+        self.renderer.statistics();
+        // Waiting keeps slow adapters from falling ever further behind the pointer.
+        self.gpu
+            .device
+            .poll(PollType::wait_indefinitely())
+            .map_err(|e| anyhow!("the GPU failed: {e}"))?;
+        self.gpu.check()?;
+        copy.map(|copy| self.read(&copy)).transpose()
+    }
+
+    fn compose(
+        &self,
+        encoder: &mut CommandEncoder,
+        view: &TextureView,
+        [left, top, width, height]: [f32; 4],
+        jobs: &[ClippedPrimitive],
+        descriptor: &ScreenDescriptor,
+    ) {
+        let mut pass = encoder
+            .begin_render_pass(&RenderPassDescriptor {
+                label: Some("window"),
+                color_attachments: &[Some(RenderPassColorAttachment {
+                    view,
+                    depth_slice: None,
+                    resolve_target: None,
+                    ops: Operations {
+                        load: LoadOp::Clear(Color::BLACK),
+                        store: StoreOp::Store,
+                    },
+                })],
+                depth_stencil_attachment: None,
+                timestamp_writes: None,
+                occlusion_query_set: None,
+                multiview_mask: None,
+            })
+            .forget_lifetime();
+        if width >= 1.0 && height >= 1.0 {
+            pass.set_viewport(left, top, width, height, 0.0, 1.0);
+            self.renderer.render(&mut pass);
+        }
+        let [columns, rows] = self.size();
+        pass.set_viewport(0.0, 0.0, columns as f32, rows as f32, 0.0, 1.0);
+        self.panel.render(&mut pass, jobs, descriptor);
+    }
+
+    fn offscreen(&self) -> Texture {
+        self.gpu.device.create_texture(&TextureDescriptor {
+            label: Some("capture"),
+            size: Extent3d {
+                width: self.config.width,
+                height: self.config.height,
+                depth_or_array_layers: 1,
+            },
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: TextureDimension::D2,
+            format: self.config.format,
+            usage: TextureUsages::RENDER_ATTACHMENT | TextureUsages::COPY_SRC,
+            view_formats: &[],
+        })
+    }
+
+    fn read(&self, texture: &Texture) -> Result<Capture> {
+        let bytes = read_texture(&self.gpu.device, &self.gpu.queue, texture)?;
+        let swapped = matches!(
+            self.config.format,
+            TextureFormat::Bgra8Unorm | TextureFormat::Bgra8UnormSrgb
+        );
+        let rgb = bytes
+            .as_chunks::<4>()
+            .0
+            .iter()
+            .flat_map(|&[a, b, c, _]| if swapped { [c, b, a] } else { [a, b, c] });
+        Ok((texture.width() as usize, texture.height() as usize, rgb.collect()))
+    }
+}
