@@ -17,7 +17,7 @@ pub struct Played {
     pub backend: String,
     /// What did the work.
     pub adapter: String,
-    /// Milliseconds of a whole frame, every pass anew; the median if several were drawn.
+    /// Milliseconds of a whole frame, every pass anew; the lower median if several were drawn.
     pub frame_ms: f64,
     /// Mean number of kernels that a ray through the object meets.
     pub splats_per_ray: f64,
@@ -67,7 +67,7 @@ pub fn play(
         picture: rendered.picture,
         backend,
         adapter,
-        frame_ms: times[times.len() / 2],
+        frame_ms: times[(times.len() - 1) / 2],
         splats_per_ray: rendered.counters.splats_per_ray(),
         warnings,
     })
