@@ -95,25 +95,10 @@ mod tests {
     fn every_object_loads_without_a_complaint() {
         for o in OBJECTS {
             let (mesh, report) = parse_obj((o.mesh)().to_obj().as_bytes()).unwrap();
-            assert!(
-                report.warnings().is_empty(),
-                "{}: {:?}",
-                o.name,
-                report.warnings()
-            );
+            assert!(report.warnings().is_empty(), "{}: {:?}", o.name, report.warnings());
             assert_eq!(report.components, 1, "{}", o.name);
-            assert!(
-                (1.5..2.5).contains(&mesh.diagonal()),
-                "{}: {}",
-                o.name,
-                mesh.diagonal()
-            );
-            assert!(
-                (2_000..20_000).contains(&mesh.triangles.len()),
-                "{}: {}",
-                o.name,
-                mesh.triangles.len()
-            );
+            assert!((1.5..2.5).contains(&mesh.diagonal()), "{}: {}", o.name, mesh.diagonal());
+            assert!((2_000..20_000).contains(&mesh.triangles.len()), "{}: {}", o.name, mesh.triangles.len());
             parse_material(o.material, Path::new(".")).unwrap();
             let scene = parse_scene(o.scene, Path::new(".")).unwrap();
             assert!(scene.lights.len() >= 8, "{}", o.name);

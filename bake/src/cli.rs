@@ -145,7 +145,10 @@ fn run_bake(arguments: &BakeArguments) -> anyhow::Result<()> {
         if !(1..=1024).contains(&threads) {
             bail!("--threads must lie within 1..1024, not {threads}");
         }
-        rayon::ThreadPoolBuilder::new().num_threads(threads).build_global().context("cannot start the threads")?;
+        rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build_global()
+            .context("cannot start the threads")?;
     }
     let medium = material::load(material_path)?;
     let (mesh, mesh_report) = mesh::load_obj(mesh_path)?;

@@ -4,11 +4,11 @@
 //! finite differences). Every layer vertex is evaluated twice, at the top and at the bottom of the slab beneath it, so
 //! that any point between can be interpolated.
 
-use crate::{Prepared, Result};
 use crate::field::Shape;
 use crate::layers::Layer;
 use crate::params::{DENSITY_DIRECTIONS, Params};
 use crate::progress::Stage;
+use crate::{Prepared, Result};
 use diaphane_formats::directions::{even_directions, hash};
 use diaphane_formats::visibility::project_with;
 use glam::DVec3;
@@ -73,7 +73,8 @@ fn fluence(
         sum.par_iter_mut().enumerate().for_each(|(i, s)| {
             for row in &rows {
                 let through = |side: usize| row.boundary[side].get(i).copied().unwrap_or(1.0);
-                *s += (-kappa * row.forward[i]).exp() * through(0) + (-kappa * row.backward[i]).exp() * through(1);
+                *s += (-kappa * row.forward[i]).exp() * through(0)
+                    + (-kappa * row.backward[i]).exp() * through(1);
             }
         });
     }

@@ -20,7 +20,8 @@ pub fn show(path: &Path, as_json: bool) -> anyhow::Result<()> {
 }
 
 fn describe(asset: &Asset, sections: &[(&'static str, usize)], bytes: usize) -> Value {
-    let sizes: serde_json::Map<String, Value> = sections.iter().map(|(n, s)| ((*n).to_owned(), json!(s))).collect();
+    let sizes: serde_json::Map<String, Value> =
+        sections.iter().map(|(n, s)| ((*n).to_owned(), json!(s))).collect();
     json!({
         "format_version": asset::FORMAT_VERSION,
         "bytes": bytes,
@@ -43,7 +44,12 @@ fn print_text(path: &Path, asset: &Asset, sections: &[(&'static str, usize)], by
     let p = &i.provenance;
     println!("{}  {:.2} MB, format {}", path.display(), bytes as f64 / 1e6, asset::FORMAT_VERSION);
     println!("  made by      {} from {} and {}, seed {}", p.program, p.mesh_name, p.material_name, p.seed);
-    println!("  mesh         {} vertices, {} triangles, diagonal {}", p.mesh_report.vertices, p.mesh_report.triangles, i.diagonal());
+    println!(
+        "  mesh         {} vertices, {} triangles, diagonal {}",
+        p.mesh_report.vertices,
+        p.mesh_report.triangles,
+        i.diagonal()
+    );
     for line in p.mesh_report.warnings() {
         println!("               {line}");
     }

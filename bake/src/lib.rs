@@ -74,11 +74,13 @@ pub fn bake(input: &Input<'_>, params: &Params, progress: &dyn Progress) -> Resu
     let medium = timed.stage("medium", |_| Ok(Prepared::new(input.medium, input.mesh)))?;
     let layers = timed.stage("layers", |p| layers::build(&shape, input.medium, params, p))?;
     let density = timed.stage("density", |p| density::evaluate(&shape, &layers, &medium, params, p))?;
-    let placed = timed.stage("samples", |p| samples::place(&shape, &layers, &density, input.medium, params, p))?;
+    let placed =
+        timed.stage("samples", |p| samples::place(&shape, &layers, &density, input.medium, params, p))?;
     let lit = timed.stage("optical depth", |p| fit::depths(&shape, &medium, placed, params, p))?;
     let harmonics = timed.stage("harmonics", |p| fit::harmonics(&lit, params, p))?;
     let weights = timed.stage("weights", |p| fit::weights(&lit, params, p))?;
-    let asset = timed.stage("packing", |_| pack::pack(input, medium.sampled.as_ref(), params, &lit, harmonics, weights))?;
+    let asset = timed
+        .stage("packing", |_| pack::pack(input, medium.sampled.as_ref(), params, &lit, harmonics, weights))?;
     let report = Report::new(params, &shape, &layers, &lit, &asset, timed.seconds);
     Ok((asset, report))
 }

@@ -5,15 +5,24 @@ mod inspect;
 mod terminal;
 
 use clap::Parser;
+use diaphane_formats::one_line;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    match cli::run(cli::Arguments::parse()) {
+    let result = match cli::Arguments::try_parse() {
+        Err(e) if !e.use_stderr() => {
+            // Help and version were asked for.
+            let _ = e.print();
+            return ExitCode::SUCCESS;
+        }
+        Err(e) => Err(anyhow::anyhow!("{} (see --help)", one_line(&e.to_string()))),
+        Ok(arguments) => cli::run(arguments),
+    };
+    match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            // One line, whatever the chain of causes.
-            let line = format!("{error:#}").replace('\n', " ");
-            eprintln!("diaphane-bake: {line}");
+            let line = one_line(&format!("{error:#}"));
+            eprintln!("error: {}", line.strip_prefix("error: ").unwrap_or(&line));
             ExitCode::from(2)
         }
     }

@@ -68,7 +68,13 @@ pub(crate) fn pack(
     };
     let asset = Asset {
         info,
-        samples: Samples { position_radius, offset, weight, depth: harmonics.depth, boundary: harmonics.boundary },
+        samples: Samples {
+            position_radius,
+            offset,
+            weight,
+            depth: harmonics.depth,
+            boundary: harmonics.boundary,
+        },
         mesh_positions: input.mesh.positions.iter().map(|p| local(*p)).collect(),
         mesh_triangles: input.mesh.triangles.clone(),
         density: density_grid(medium, sampled, centre),

@@ -77,7 +77,10 @@ impl Params {
             return fail(format!("--directions must lie within 1..65536, not {}", self.directions));
         }
         if !(1..=256).contains(&self.points_per_sample) {
-            return fail(format!("the points for each sample must lie within 1..256, not {}", self.points_per_sample));
+            return fail(format!(
+                "the points for each sample must lie within 1..256, not {}",
+                self.points_per_sample
+            ));
         }
         if !(1..=MAX_ORDER).contains(&self.order) {
             return fail(format!("--sh-order must lie within 1..{MAX_ORDER}, not {}", self.order));

@@ -63,7 +63,8 @@ fn another_seed_is_another_asset() {
 fn the_count_is_met_within_five_percent() {
     let mesh = ball();
     for (samples, kappa) in [(150, 2.0), (1000, 0.5), (4000, 6.0), (4000, 40.0)] {
-        let asset = run(&mesh, &medium(kappa, 1.0, Density::Uniform(1.0)), &Params { samples, ..small() }).unwrap();
+        let asset =
+            run(&mesh, &medium(kappa, 1.0, Density::Uniform(1.0)), &Params { samples, ..small() }).unwrap();
         let error = asset.samples.len() as f64 / samples as f64 - 1.0;
         assert!(error.abs() <= 0.05, "{samples} wanted at extinction {kappa}, got {}", asset.samples.len());
     }
@@ -75,8 +76,7 @@ fn samples_lie_inside_apart_and_reach_the_boundary() {
     let asset = run(&mesh, &medium(4.0, 1.0, Density::Uniform(1.0)), &small()).unwrap();
     let s = &asset.samples;
     let radii: Vec<f32> = s.position_radius.iter().map(|p| p[3]).collect();
-    let (least, largest) =
-        radii.iter().fold((f32::INFINITY, 0.0f32), |(a, b), r| (a.min(*r), b.max(*r)));
+    let (least, largest) = radii.iter().fold((f32::INFINITY, 0.0f32), |(a, b), r| (a.min(*r), b.max(*r)));
     // Between half and twice a mean radius.
     assert!(largest / least <= 4.0 + 1e-3, "{least} {largest}");
     let on_boundary = (0..s.len()).filter(|&i| s.position(i).length() > 0.98).count();
@@ -138,11 +138,8 @@ fn weights_sum_to_one_inside() {
 
 #[test]
 fn nothing_is_placed_where_nothing_scatters() {
-    let core = Shape {
-        solid: Solid::Sphere { center: DVec3::ZERO, radius: 0.5 },
-        density: 5.0,
-        absorb: true,
-    };
+    let core =
+        Shape { solid: Solid::Sphere { center: DVec3::ZERO, radius: 0.5 }, density: 5.0, absorb: true };
     let medium = medium(2.0, 1.0, Density::Shapes(Shapes { base: 1.0, shapes: vec![core] }));
     let asset = run(&ball(), &medium, &small()).unwrap();
     let inside = (0..asset.samples.len()).filter(|&i| asset.samples.position(i).length() < 0.5).count();

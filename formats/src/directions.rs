@@ -52,7 +52,9 @@ pub fn subpixel_offsets(count: usize) -> Vec<[f32; 2]> {
     }
     let radical_inverse = |i: usize| (i as u32).reverse_bits() as f64 / 2f64.powi(32);
     let shift = 0.5 / count as f64;
-    (0..count).map(|i| [((i as f64 + 0.5) / count as f64) as f32, (radical_inverse(i) + shift) as f32]).collect()
+    (0..count)
+        .map(|i| [((i as f64 + 0.5) / count as f64) as f32, (radical_inverse(i) + shift) as f32])
+        .collect()
 }
 
 #[cfg(test)]

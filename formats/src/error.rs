@@ -5,6 +5,12 @@ use std::path::{Path, PathBuf};
 /// Shorthand for results of this crate.
 pub type Result<T> = std::result::Result<T, Error>;
 
+/// The first paragraph of a message in one line: what a program prints when it gives up.
+pub fn one_line(message: &str) -> String {
+    let paragraph = message.split("\n\n").find(|p| !p.trim().is_empty()).unwrap_or_default();
+    paragraph.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
 /// What can go wrong with files and their contents.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]

@@ -58,11 +58,7 @@ pub fn require_different(output: &Path, input: &Path) -> Result<()> {
         (Ok(a), Ok(b)) => a == b,
         _ => output == input,
     };
-    if same {
-        Err(Error::file(output, "is both input and output; choose another output"))
-    } else {
-        Ok(())
-    }
+    if same { Err(Error::file(output, "is both input and output; choose another output")) } else { Ok(()) }
 }
 
 fn parent(path: &Path) -> &Path {

@@ -203,11 +203,7 @@ struct Path {
 
 impl Path {
     fn new(along: &Along, clipped: &Clipped, start: f32) -> Self {
-        let mut path = Self {
-            before: [0.0; LANES],
-            density: [1.0; LANES],
-            scattering: [1.0; LANES],
-        };
+        let mut path = Self { before: [0.0; LANES], density: [1.0; LANES], scattering: [1.0; LANES] };
         match along {
             Along::Uniform(_) => {
                 for k in 0..LANES {
@@ -254,17 +250,18 @@ impl Path {
         } else {
             for k in (0..LANES).filter(|&k| clipped.weight[k] > 0.0) {
                 let (from, to) = (clipped.from[k], clipped.from[k] + clipped.length[k]);
-                let g = kernel::integral(
+                let g =
+                    kernel::integral(chunk.a[k], chunk.d2[k], chunk.tc[k], kappa * self.density[k], from, to);
+                out[k] = g * (-kappa * self.before[k]).exp() * (clipped.weight[k] * self.scattering[k]);
+                mean[k] = kernel::mean_offset(
                     chunk.a[k],
                     chunk.d2[k],
                     chunk.tc[k],
                     kappa * self.density[k],
                     from,
                     to,
+                    g,
                 );
-                out[k] = g * (-kappa * self.before[k]).exp() * (clipped.weight[k] * self.scattering[k]);
-                mean[k] =
-                    kernel::mean_offset(chunk.a[k], chunk.d2[k], chunk.tc[k], kappa * self.density[k], from, to, g);
             }
         }
         (out, mean)
@@ -284,11 +281,7 @@ fn add_product(sum: &mut Lanes, x: &Lanes, y: &Lanes) {
 }
 
 fn clip(chunk: &Chunk, start: f32, end: f32) -> Clipped {
-    let mut clipped = Clipped {
-        from: [0.0; LANES],
-        length: [0.0; LANES],
-        weight: [0.0; LANES],
-    };
+    let mut clipped = Clipped { from: [0.0; LANES], length: [0.0; LANES], weight: [0.0; LANES] };
     for k in 0..LANES {
         let h2 = CUT_OFF / (chunk.a[k] * chunk.a[k]) - chunk.d2[k];
         let reach = h2.max(0.0).sqrt();
@@ -367,16 +360,9 @@ mod tests {
         for i in 0..=40_000 {
             let x = -86.0 + 174.0 * i as f32 / 40_000.0;
             let exact = f64::from(x).exp();
-            assert!(
-                (f64::from(exp(x)) / exact - 1.0).abs() < 3e-7,
-                "exp {x}: {} {exact}",
-                exp(x)
-            );
+            assert!((f64::from(exp(x)) / exact - 1.0).abs() < 3e-7, "exp {x}: {} {exact}", exp(x));
             let x = -6.0 + 12.0 * i as f32 / 40_000.0;
-            assert!(
-                (f64::from(erf(x)) - libm::erf(f64::from(x))).abs() < 5e-7,
-                "erf {x}"
-            );
+            assert!((f64::from(erf(x)) - libm::erf(f64::from(x))).abs() < 5e-7, "erf {x}");
         }
         assert!(exp(-1e30) < 1e-37 && exp(f32::NEG_INFINITY) < 1e-37);
     }

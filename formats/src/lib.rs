@@ -31,4 +31,4 @@ pub mod slopes;
 mod toml_keys;
 pub mod visibility;
 
-pub use error::{Error, Result};
+pub use error::{Error, Result, one_line};

@@ -25,7 +25,13 @@ pub fn parse_material(text: &str, folder: &Path) -> Result<Medium> {
     let r = Reader::new(&table, "", &["extinction", "albedo", "phase", "ior", "density"])?;
     let phase = r.table("phase")?.map_or(Ok(Phase::Isotropic), parse_phase)?;
     let density = r.table("density")?.map_or(Ok(Density::Uniform(1.0)), |t| parse_density(t, folder))?;
-    Medium::new(r.required_vector("extinction")?, r.required_vector("albedo")?, phase, r.number_or("ior", 1.0)?, density)
+    Medium::new(
+        r.required_vector("extinction")?,
+        r.required_vector("albedo")?,
+        phase,
+        r.number_or("ior", 1.0)?,
+        density,
+    )
 }
 
 fn parse_phase(table: &Table) -> Result<Phase> {
@@ -52,7 +58,9 @@ fn parse_density(table: &Table, folder: &Path) -> Result<Density> {
             let densities = r.numbers("densities")?.unwrap_or_default();
             let period = r.required_number("period")?;
             if densities.is_empty() || densities.len() > 64 || densities.iter().any(|d| *d < 0.0) {
-                return Err(Error::invalid("'density.densities' must list 1 to 64 values that are not negative"));
+                return Err(Error::invalid(
+                    "'density.densities' must list 1 to 64 values that are not negative",
+                ));
             }
             if period <= 0.0 {
                 return Err(Error::invalid("'density.period' must be above 0"));
@@ -67,7 +75,9 @@ fn parse_density(table: &Table, folder: &Path) -> Result<Density> {
                 return Err(Error::invalid("'density.range' must be a list of two numbers"));
             };
             if frequency <= 0.0 || low < 0.0 || high < low {
-                return Err(Error::invalid("'density': frequency must be above 0 and range 0 <= low <= high"));
+                return Err(Error::invalid(
+                    "'density': frequency must be above 0 and range 0 <= low <= high",
+                ));
             }
             let seed = r.integer("seed", 0..=i64::MAX)?.unwrap_or(0) as u64;
             let octaves = r.integer("octaves", 1..=12)?.unwrap_or(1) as u32;
@@ -79,7 +89,8 @@ fn parse_density(table: &Table, folder: &Path) -> Result<Density> {
             if base < 0.0 {
                 return Err(Error::invalid("'density.base' must not be negative"));
             }
-            let shapes = r.tables("shapes")?.into_iter().map(|t| parse_shape(t, folder)).collect::<Result<_>>()?;
+            let shapes =
+                r.tables("shapes")?.into_iter().map(|t| parse_shape(t, folder)).collect::<Result<_>>()?;
             Ok(Density::Shapes(Shapes { base, shapes }))
         }
         other => Err(unknown_type(PLACE, other, &["grid", "layers", "noise", "shapes"])),

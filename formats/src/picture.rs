@@ -56,7 +56,8 @@ pub fn parse_exr(bytes: &[u8]) -> Result<Picture> {
     let size = image.layer_data.size;
     let channels = &image.layer_data.channel_data.list;
     let find = |name: &str| channels.iter().find(|c| c.name.to_string().eq_ignore_ascii_case(name));
-    let values = |channel: &AnyChannel<FlatSamples>| -> Vec<f32> { channel.sample_data.values_as_f32().collect() };
+    let values =
+        |channel: &AnyChannel<FlatSamples>| -> Vec<f32> { channel.sample_data.values_as_f32().collect() };
     let rgb = match (find("R"), find("G"), find("B")) {
         (Some(r), Some(g), Some(b)) => [values(r), values(g), values(b)],
         _ => match channels.iter().find(|c| !c.name.to_string().eq_ignore_ascii_case("A")) {

@@ -39,11 +39,8 @@ impl Cloud {
     /// Kernels of an asset's samples.
     pub fn new(samples: &Samples, width_factor: f32) -> Self {
         let centre: Vec<Vec3> = (0..samples.len()).map(|i| samples.position(i)).collect();
-        let sharpness: Vec<f32> = samples
-            .position_radius
-            .iter()
-            .map(|p| kernel::sharpness(p[3], width_factor))
-            .collect();
+        let sharpness: Vec<f32> =
+            samples.position_radius.iter().map(|p| kernel::sharpness(p[3], width_factor)).collect();
         Self::from_parts(centre, sharpness, samples.weight.clone())
     }
 
@@ -62,12 +59,7 @@ impl Cloud {
         } else {
             build_bvh2(&boxes, BvhBuildParams::fast_build(), &mut Default::default())
         };
-        Self {
-            centre,
-            sharpness,
-            weight,
-            bvh,
-        }
+        Self { centre, sharpness, weight, bvh }
     }
 
     /// Calls `visit` with every kernel whose support may meet the ray between `start` and `end`.
@@ -84,8 +76,7 @@ impl Cloud {
         }
         let from = Vec3A::from(origin + direction * start);
         let ray = Ray::new(from, Vec3A::from(direction) + Vec3A::ZERO, 0.0, end - start);
-        self.bvh
-            .ray_traverse_anyhit(ray, |_, slot| visit(self.bvh.primitive_indices[slot] as usize));
+        self.bvh.ray_traverse_anyhit(ray, |_, slot| visit(self.bvh.primitive_indices[slot] as usize));
     }
 
     /// Calls `visit` with every kernel whose support may hold the point.
@@ -129,12 +120,8 @@ impl Profile {
         const SUBSTEPS: usize = 2;
         let cell = (end - start) / PROFILE_CELLS as f32;
         let h = cell / SUBSTEPS as f32;
-        let mut profile = Self {
-            start,
-            cell,
-            density: [0.0; PROFILE_CELLS + 1],
-            scattering: [0.0; PROFILE_CELLS + 1],
-        };
+        let mut profile =
+            Self { start, cell, density: [0.0; PROFILE_CELLS + 1], scattering: [0.0; PROFILE_CELLS + 1] };
         let mut sum = [0.0f32; 2];
         for k in 0..PROFILE_CELLS {
             for s in 0..SUBSTEPS {
@@ -171,10 +158,9 @@ impl Along {
     /// A of the module's head, per channel.
     pub fn emission(&self, start: f32, end: f32) -> Vec3 {
         match self {
-            Self::Uniform(kappa) => (*kappa * (end - start))
-                .to_array()
-                .map(|y| y * kernel::decay_mean(y))
-                .into(),
+            Self::Uniform(kappa) => {
+                (*kappa * (end - start)).to_array().map(|y| y * kernel::decay_mean(y)).into()
+            }
             Self::Profile(kappa, p) => {
                 let mut sum = Vec3::ZERO;
                 for k in 0..PROFILE_CELLS {
@@ -242,21 +228,10 @@ mod tests {
         for kappa in [0.0, 0.1, 3.0, 40.0] {
             let along = Along::Uniform(Vec3::new(kappa, 2.0 * kappa, 0.5 * kappa));
             let direction = Vec3::new(0.1, 0.2, -1.0).normalize();
-            let sum = piece_radiance(
-                &cloud,
-                &source,
-                Vec3::new(0.0, 0.0, 3.0),
-                direction,
-                2.4,
-                3.7,
-                &along,
-            );
+            let sum = piece_radiance(&cloud, &source, Vec3::new(0.0, 0.0, 3.0), direction, 2.4, 3.7, &along);
             for (c, factor) in [(0, 1.0), (1, 2.0), (2, 0.5)] {
                 let exact = source[0].value[c] * (1.0 - (-kappa * factor * 1.3f32).exp());
-                assert!(
-                    (sum.radiance[c] - exact).abs() <= 2e-5 * exact.max(1e-3),
-                    "{kappa} {c}"
-                );
+                assert!((sum.radiance[c] - exact).abs() <= 2e-5 * exact.max(1e-3), "{kappa} {c}");
             }
         }
     }
@@ -264,8 +239,7 @@ mod tests {
     #[test]
     fn flat_profile_agrees_with_uniform() {
         let cloud = cloud();
-        let source: Vec<Source> =
-            cloud.centre.iter().map(|c| Source::flat(Vec3::splat(1.0 + c.x))).collect();
+        let source: Vec<Source> = cloud.centre.iter().map(|c| Source::flat(Vec3::splat(1.0 + c.x))).collect();
         let grid = DensityGrid {
             size: [1, 1, 1],
             min: [-1.0; 3],
@@ -279,10 +253,7 @@ mod tests {
         let b = Along::Uniform(0.5 * kappa);
         let x = piece_radiance(&cloud, &source, origin, direction, 2.3, 3.7, &a);
         let y = piece_radiance(&cloud, &source, origin, direction, 2.3, 3.7, &b);
-        assert!(
-            (x.radiance - y.radiance).length() < 1e-4 * y.radiance.length(),
-            "{x:?} {y:?}"
-        );
+        assert!((x.radiance - y.radiance).length() < 1e-4 * y.radiance.length(), "{x:?} {y:?}");
         assert!((a.transmittance(2.3, 3.7) - b.transmittance(2.3, 3.7)).length() < 1e-5);
     }
 
@@ -329,10 +300,7 @@ mod tests {
             splats += 1;
         }
         let mean = Vec3::select(denominator.cmpgt(Vec3::ZERO), numerator / denominator, Vec3::ZERO);
-        PieceSum {
-            radiance: along.emission(start, end) * mean,
-            splats,
-        }
+        PieceSum { radiance: along.emission(start, end) * mean, splats }
     }
 
     #[test]
@@ -350,15 +318,9 @@ mod tests {
                 slope: [signed(i, 20), signed(i, 24), signed(i, 28)],
             })
             .collect();
-        let values = (0..512)
-            .map(|i| [unit(i, 5), unit(i, 6)].map(|v| half::f16::from_f32(2.0 * v)))
-            .collect();
-        let grid = DensityGrid {
-            size: [8; 3],
-            min: [-1.0; 3],
-            max: [1.0; 3],
-            values,
-        };
+        let values =
+            (0..512).map(|i| [unit(i, 5), unit(i, 6)].map(|v| half::f16::from_f32(2.0 * v))).collect();
+        let grid = DensityGrid { size: [8; 3], min: [-1.0; 3], max: [1.0; 3], values };
         for i in 0..2000 {
             let origin = Vec3::new(unit(i, 7), unit(i, 8), unit(i, 9)) * 0.4 + Vec3::Z * 3.0;
             let direction = Vec3::new(unit(i, 10) - 0.5, unit(i, 11) - 0.5, -4.0).normalize();
@@ -374,10 +336,7 @@ mod tests {
                     // Errors are relative to whole kernels: a ray that only grazes a few rims has tiny weights, and
                     // with slopes of up to 7 the error of their mean position counts seven times.
                     let bound = if exact.splats < 8 { 7e-3 } else { 2e-5 };
-                    assert!(
-                        error <= bound * exact.radiance.length() + 1e-9,
-                        "{along:?} {got:?} {exact:?}"
-                    );
+                    assert!(error <= bound * exact.radiance.length() + 1e-9, "{along:?} {got:?} {exact:?}");
                     // Rounding at the rim of a support may count a kernel more or less.
                     assert!(got.splats.abs_diff(exact.splats) <= 1);
                 }

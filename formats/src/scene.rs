@@ -290,7 +290,9 @@ fn parse_light(table: &Table) -> Result<Light> {
         Ok(v)
     };
     match type_of(table, PLACE)? {
-        "point" => Ok(Light::Point { position: r.required_vector("position")?, intensity: colour("intensity")? }),
+        "point" => {
+            Ok(Light::Point { position: r.required_vector("position")?, intensity: colour("intensity")? })
+        }
         "directional" => Ok(Light::Directional {
             direction: r.required_direction("direction")?,
             irradiance: colour("irradiance")?,
@@ -315,7 +317,8 @@ fn parse_light(table: &Table) -> Result<Light> {
 mod tests {
     use super::*;
 
-    const GOOD: &str = "[camera]\nposition=[0,0,4]\ntarget=[0,0,0]\nvertical_fov_degrees=30\n[image]\nwidth=8\nheight=4\n";
+    const GOOD: &str =
+        "[camera]\nposition=[0,0,4]\ntarget=[0,0,0]\nvertical_fov_degrees=30\n[image]\nwidth=8\nheight=4\n";
 
     fn message(text: &str) -> String {
         parse_scene(text, Path::new(".")).unwrap_err().to_string()

@@ -158,7 +158,8 @@ mod tests {
             let expected = (2 * l + 1) as f64 / (4.0 * std::f64::consts::PI) * legendre;
             assert!((sum - expected).abs() < 1e-12, "band {l}");
             let lf = l as f64;
-            (before, legendre) = (legendre, ((2.0 * lf + 1.0) * cosine * legendre - lf * before) / (lf + 1.0));
+            (before, legendre) =
+                (legendre, ((2.0 * lf + 1.0) * cosine * legendre - lf * before) / (lf + 1.0));
         }
     }
 

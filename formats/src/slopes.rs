@@ -231,13 +231,12 @@ mod tests {
         let samples = samples(800);
         let stencil = Stencil::new(&samples, |_| 10.0);
         let slope = [Vec3::new(2.0, -1.0, 0.5), Vec3::new(0.0, 3.0, 0.0), Vec3::ZERO];
-        let values: Vec<Vec3> = (0..samples.len())
-            .map(|i| Vec3::from(slope.map(|s| s.dot(samples.position(i)).exp())))
-            .collect();
+        let values: Vec<Vec3> =
+            (0..samples.len()).map(|i| Vec3::from(slope.map(|s| s.dot(samples.position(i)).exp()))).collect();
         for source in stencil.sources(&values) {
-            for c in 0..3 {
+            for (got, exact) in source.slope.iter().zip(slope) {
                 // The ridge shortens slopes by a few parts in a thousand.
-                assert!((source.slope[c] - slope[c]).length() < 0.03 * slope[c].length() + 1e-4, "{source:?}");
+                assert!((*got - exact).length() < 0.03 * exact.length() + 1e-4, "{source:?}");
             }
         }
     }

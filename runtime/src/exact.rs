@@ -60,9 +60,7 @@ impl DepthTracer {
         Ok(Self {
             mesh: asset.mesh()?,
             medium: asset.medium()?,
-            places: (0..asset.samples.len())
-                .map(|i| asset.samples.centroid(i))
-                .collect(),
+            places: (0..asset.samples.len()).map(|i| asset.samples.centroid(i)).collect(),
             accel: OnceLock::new(),
             traced: Vec::new(),
         })
@@ -71,18 +69,12 @@ impl DepthTracer {
     /// Depths towards the lights of `frame` named by `wanted` (indices; those out of range are ignored). Lights that
     /// were traced in the call before are not traced again.
     pub fn trace(&mut self, frame: &Frame, wanted: &[usize]) -> ExactDepths {
-        let mut depths = ExactDepths {
-            lights: vec![None; frame.lights.len()],
-        };
+        let mut depths = ExactDepths { lights: vec![None; frame.lights.len()] };
         let mut kept = Vec::with_capacity(wanted.len());
         for &index in wanted.iter().filter(|&&i| i < frame.lights.len()) {
             let light = &frame.lights[index];
             let key = place(light);
-            let known = self
-                .traced
-                .iter()
-                .find(|(k, _)| *k == key)
-                .map(|(_, t)| Arc::clone(t));
+            let known = self.traced.iter().find(|(k, _)| *k == key).map(|(_, t)| Arc::clone(t));
             let table = known.unwrap_or_else(|| Arc::new(self.light(light, frame.least_distance)));
             kept.push((key, Arc::clone(&table)));
             depths.lights[index] = Some(table);
@@ -107,10 +99,6 @@ impl DepthTracer {
             let depth = depth_along(accel, &self.medium, x.as_dvec3(), to, limit, scratch);
             [depth.density_length as f32, depth.boundary as f32]
         };
-        self.places
-            .par_iter()
-            .with_min_len(64)
-            .map_init(Vec::new, trace)
-            .collect()
+        self.places.par_iter().with_min_len(64).map_init(Vec::new, trace).collect()
     }
 }

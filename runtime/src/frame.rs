@@ -149,9 +149,7 @@ impl Frame {
         let inside = |l: &FrameLight| {
             l.kind != LightKind::Directional && l.position.cmpgt(low).all() && l.position.cmplt(high).all()
         };
-        (0..self.scene_lights)
-            .filter(|&i| inside(&self.lights[i]))
-            .collect()
+        (0..self.scene_lights).filter(|&i| inside(&self.lights[i])).collect()
     }
 }
 
@@ -166,27 +164,16 @@ fn frame_light(light: &Light, centre: DVec3) -> FrameLight {
         cos_outer: -1.0,
     };
     match *light {
-        Light::Point { position, intensity } => FrameLight {
-            position: local(position),
-            colour: intensity.as_vec3(),
-            ..base
-        },
-        Light::Directional {
-            direction,
-            irradiance,
-        } => FrameLight {
+        Light::Point { position, intensity } => {
+            FrameLight { position: local(position), colour: intensity.as_vec3(), ..base }
+        }
+        Light::Directional { direction, irradiance } => FrameLight {
             kind: LightKind::Directional,
             direction: direction.as_vec3(),
             colour: irradiance.as_vec3(),
             ..base
         },
-        Light::Spot {
-            position,
-            direction,
-            intensity,
-            cos_inner,
-            cos_outer,
-        } => FrameLight {
+        Light::Spot { position, direction, intensity, cos_inner, cos_outer } => FrameLight {
             kind: LightKind::Spot,
             position: local(position),
             direction: direction.as_vec3(),
@@ -230,10 +217,8 @@ fn project_environment(environment: &Environment) -> Vec<DVec3> {
     for row in 0..picture.height {
         let theta = PI * (row as f64 + 0.5) / picture.height as f64;
         // Exact solid angle of the row's band, shared by its pixels.
-        let (top, bottom) = (
-            PI * row as f64 / picture.height as f64,
-            PI * (row + 1) as f64 / picture.height as f64,
-        );
+        let (top, bottom) =
+            (PI * row as f64 / picture.height as f64, PI * (row + 1) as f64 / picture.height as f64);
         let solid_angle = TAU / picture.width as f64 * (top.cos() - bottom.cos());
         for column in 0..picture.width {
             let phi = TAU * ((column as f64 + 0.5) / picture.width as f64 - 0.5);
@@ -279,10 +264,7 @@ mod tests {
             }
         }
         let lights = environment_lights(&Environment { picture, scale: 1.0 });
-        let brightest = lights
-            .iter()
-            .max_by(|a, b| a.colour.x.total_cmp(&b.colour.x))
-            .unwrap();
+        let brightest = lights.iter().max_by(|a, b| a.colour.x.total_cmp(&b.colour.x)).unwrap();
         assert!(brightest.direction.x < -0.9, "{:?}", brightest.direction);
     }
 }

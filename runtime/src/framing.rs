@@ -20,10 +20,7 @@ pub fn default_scene(info: &Info) -> Scene {
     let light = |direction: DVec3, colour: DVec3| {
         let away = 2.5 * radius;
         let position = centre + direction.normalize() * away;
-        Light::Point {
-            position,
-            intensity: colour * (4.0 * away * away),
-        }
+        Light::Point { position, intensity: colour * (4.0 * away * away) }
     };
     Scene {
         camera: Camera {
@@ -32,16 +29,8 @@ pub fn default_scene(info: &Info) -> Scene {
             up: DVec3::Y,
             vertical_fov_degrees: fov,
         },
-        image: ImageSize {
-            width: 512,
-            height: 512,
-            samples_per_pixel: 4,
-        },
-        surface: Surface {
-            reflection: true,
-            specular: 0.5,
-            roughness: 0.3,
-        },
+        image: ImageSize { width: 512, height: 512, samples_per_pixel: 4 },
+        surface: Surface { reflection: true, specular: 0.5, roughness: 0.3 },
         environment: None,
         lights: vec![
             light(DVec3::new(1.0, 0.6, 0.5), DVec3::new(1.0, 0.75, 0.5)),

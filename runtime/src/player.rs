@@ -58,14 +58,7 @@ impl Player {
     pub fn new(asset: &Asset, backend: Backend) -> Result<Self> {
         let (engine, note) = open(asset, backend)?;
         let tracer = DepthTracer::new(asset)?;
-        Ok(Self {
-            engine,
-            note,
-            info: asset.info.clone(),
-            tracer,
-            reuse: false,
-            last: None,
-        })
+        Ok(Self { engine, note, info: asset.info.clone(), tracer, reuse: false, last: None })
     }
 
     /// Why the backend is not the one that would have been preferred.
@@ -102,10 +95,7 @@ impl Player {
             && last == frame
             && *last_mode == mode
         {
-            return Ok(Rendered {
-                passes: Vec::new(),
-                ..rendered.clone()
-            });
+            return Ok(Rendered { passes: Vec::new(), ..rendered.clone() });
         }
         let started = Instant::now();
         let exact = self.exact(frame, mode);
@@ -148,20 +138,15 @@ fn open(asset: &Asset, backend: Backend) -> Result<(Engine, Option<String>)> {
         Backend::Gpu => Ok((gpu()?, None)),
         Backend::Auto => match gpu() {
             Ok(Engine::Gpu(gpu)) if is_software(&gpu) => {
-                let why = format!(
-                    "{} is slower than this program on the CPU; drawing on the CPU",
-                    gpu.adapter()
-                );
+                let why =
+                    format!("{} is slower than this program on the CPU; drawing on the CPU", gpu.adapter());
                 Ok((cpu()?, Some(why)))
             }
             Ok(engine) => Ok((engine, None)),
             Err(Error::NoAdapter(why)) => {
                 Ok((cpu()?, Some(format!("no usable GPU ({why}); drawing on the CPU"))))
             }
-            Err(Error::Gpu(why)) => Ok((
-                cpu()?,
-                Some(format!("the GPU failed ({why}); drawing on the CPU")),
-            )),
+            Err(Error::Gpu(why)) => Ok((cpu()?, Some(format!("the GPU failed ({why}); drawing on the CPU")))),
             Err(other) => Err(other),
         },
     }

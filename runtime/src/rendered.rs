@@ -37,11 +37,7 @@ pub struct Counters {
 impl Counters {
     /// Mean number of kernels over the rays that hit the mesh; 0 when none does.
     pub fn splats_per_ray(&self) -> f64 {
-        if self.rays_hit == 0 {
-            0.0
-        } else {
-            self.splats as f64 / self.rays_hit as f64
-        }
+        if self.rays_hit == 0 { 0.0 } else { self.splats as f64 / self.rays_hit as f64 }
     }
 
     /// The sum of two counts of rays; `samples_drawn` is kept, it belongs to the frame.

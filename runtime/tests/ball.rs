@@ -29,10 +29,7 @@ fn rel_rmse(asset: &Asset, scene: &Scene, rendered: &Rendered) -> f64 {
         .lights
         .iter()
         .map(|l| match *l {
-            Light::Point { position, intensity } => Light::Point {
-                position: position - HERE,
-                intensity,
-            },
+            Light::Point { position, intensity } => Light::Point { position: position - HERE, intensity },
             other => other,
         })
         .collect();
@@ -45,10 +42,7 @@ fn rel_rmse(asset: &Asset, scene: &Scene, rendered: &Rendered) -> f64 {
         }
         let mut exact = DVec3::ZERO;
         for [dx, dy] in &offsets {
-            let (x, y) = (
-                (i % width) as f64 + f64::from(*dx),
-                (i / width) as f64 + f64::from(*dy),
-            );
+            let (x, y) = ((i % width) as f64 + f64::from(*dx), (i / width) as f64 + f64::from(*dy));
             let direction = rays.direction(x, y, width as f64, height as f64);
             exact += reference(asset, &local, rays.origin - HERE, direction) / offsets.len() as f64;
         }
@@ -72,10 +66,7 @@ fn agrees_with_closed_form_single_scattering() {
         let scene = scene(HERE, 32, 1, side_light());
         let baked = rel_rmse(&asset, &scene, &draw(&asset, &scene, LightMode::Baked));
         let exact = rel_rmse(&asset, &scene, &draw(&asset, &scene, LightMode::Exact));
-        println!(
-            "{} samples, {phase:?}: baked {baked:.4}, exact {exact:.4}",
-            asset.samples.len()
-        );
+        println!("{} samples, {phase:?}: baked {baked:.4}, exact {exact:.4}", asset.samples.len());
         assert!(baked < 0.12, "{phase:?}: {baked}");
         assert!(exact < 0.08, "{phase:?}: {exact}");
     }
@@ -129,10 +120,7 @@ fn odd_frames_stay_finite() {
     let on_sample = asset.samples.position(asset.samples.len() / 2).as_dvec3();
     let lights = vec![
         point(HERE, on_sample, 1.0),
-        Light::Directional {
-            direction: DVec3::NEG_Y,
-            irradiance: DVec3::ONE,
-        },
+        Light::Directional { direction: DVec3::NEG_Y, irradiance: DVec3::ONE },
         Light::Spot {
             position: HERE + on_sample,
             direction: DVec3::X,
@@ -163,23 +151,12 @@ fn reflection_adds_light_only_with_a_boundary() {
     assert_eq!(matched.picture, plain.picture);
     asset.info.ior = 1.5;
     asset.samples.boundary = vec![0.0; asset.samples.depth.len()];
-    asset
-        .samples
-        .boundary
-        .iter_mut()
-        .step_by(support::ORDER * support::ORDER)
-        .for_each(|c| *c = 3.5);
+    asset.samples.boundary.iter_mut().step_by(support::ORDER * support::ORDER).for_each(|c| *c = 3.5);
     let dull = draw(&asset, &scene, LightMode::Baked);
     scene.surface.reflection = true;
     let shiny = draw(&asset, &scene, LightMode::Baked);
     let mut brighter = 0;
-    for (a, b) in dull
-        .picture
-        .pixels
-        .iter()
-        .flatten()
-        .zip(shiny.picture.pixels.iter().flatten())
-    {
+    for (a, b) in dull.picture.pixels.iter().flatten().zip(shiny.picture.pixels.iter().flatten()) {
         assert!(b >= a);
         brighter += usize::from(*b > *a);
     }

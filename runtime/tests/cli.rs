@@ -40,19 +40,8 @@ fn play(folder: &Path, arguments: &[&str]) -> Output {
 #[test]
 fn writes_picture_and_statistics() {
     let folder = folder("writes");
-    let arguments = [
-        "ball.dph",
-        "--scene",
-        "a.scene.toml",
-        "--backend",
-        "cpu",
-        "--frames",
-        "3",
-    ];
-    let done = play(
-        &folder,
-        &[&arguments[..], &["--output", "o.exr", "--stats", "s.json"]].concat(),
-    );
+    let arguments = ["ball.dph", "--scene", "a.scene.toml", "--backend", "cpu", "--frames", "3"];
+    let done = play(&folder, &[&arguments[..], &["--output", "o.exr", "--stats", "s.json"]].concat());
     assert!(done.status.success(), "{done:?}");
     let picture = picture::read_exr(&folder.join("o.exr")).unwrap();
     assert_eq!((picture.width, picture.height), (12, 10));
@@ -61,34 +50,16 @@ fn writes_picture_and_statistics() {
     let text = std::fs::read_to_string(folder.join("s.json")).unwrap();
     let stats: serde_json::Value = serde_json::from_str(&text).unwrap();
     assert_eq!(stats["backend"], "cpu");
-    assert_eq!(
-        (&stats["width"], &stats["lights"], &stats["frames"]),
-        (&12.into(), &1.into(), &3.into())
-    );
-    for key in [
-        "adapter",
-        "height",
-        "samples",
-        "samples_drawn",
-        "splats_per_pixel",
-        "pass_ms",
-        "counters",
-    ] {
+    assert_eq!((&stats["width"], &stats["lights"], &stats["frames"]), (&12.into(), &1.into(), &3.into()));
+    for key in ["adapter", "height", "samples", "samples_drawn", "splats_per_pixel", "pass_ms", "counters"] {
         assert!(!stats[key].is_null(), "{key}");
     }
     for time in ["min", "median", "max"] {
         assert!(stats["frame_ms"][time].is_number() && stats["pass_ms"]["splat"][time].is_number());
     }
-    let png = play(
-        &folder,
-        &[&arguments[..], &["--output", "o.png", "--reuse"]].concat(),
-    );
+    let png = play(&folder, &[&arguments[..], &["--output", "o.png", "--reuse"]].concat());
     assert!(png.status.success());
-    assert!(
-        std::fs::read(folder.join("o.png"))
-            .unwrap()
-            .starts_with(b"\x89PNG")
-    );
+    assert!(std::fs::read(folder.join("o.png")).unwrap().starts_with(b"\x89PNG"));
 }
 
 #[test]
@@ -96,15 +67,7 @@ fn no_lights_is_black_with_a_warning() {
     let folder = folder("dark");
     let dark = SCENE.split("[[lights]]").next().unwrap();
     std::fs::write(folder.join("dark.toml"), dark).unwrap();
-    let arguments = [
-        "ball.dph",
-        "--scene",
-        "dark.toml",
-        "--backend",
-        "cpu",
-        "--output",
-        "o.exr",
-    ];
+    let arguments = ["ball.dph", "--scene", "dark.toml", "--backend", "cpu", "--output", "o.exr"];
     let done = play(&folder, &arguments);
     assert!(done.status.success() && String::from_utf8_lossy(&done.stderr).contains("no lights"));
     let picture = picture::read_exr(&folder.join("o.exr")).unwrap();
@@ -129,37 +92,19 @@ fn refuses_bad_input_in_one_line() {
         (&["ball.dph", "--output", "o.jpg"], ".exr or .png"),
         (&["ball.dph", "--output", "nowhere/o.png"], "cannot write"),
         (&["input.exr", "--output", "./input.exr"], "both input and output"),
-        (
-            &["ball.dph", "--scene", "scene.png", "--output", "scene.png"],
-            "both input and output",
-        ),
-        (
-            &["ball.dph", "--scene", "zero.toml", "--output", "o.png"],
-            "image.width",
-        ),
-        (
-            &["ball.dph", "--scene", "misspelt.toml", "--output", "o.png"],
-            "'width'",
-        ),
-        (
-            &["ball.dph", "--scene", "on_target.toml", "--output", "o.png"],
-            "same point",
-        ),
+        (&["ball.dph", "--scene", "scene.png", "--output", "scene.png"], "both input and output"),
+        (&["ball.dph", "--scene", "zero.toml", "--output", "o.png"], "image.width"),
+        (&["ball.dph", "--scene", "misspelt.toml", "--output", "o.png"], "'width'"),
+        (&["ball.dph", "--scene", "on_target.toml", "--output", "o.png"], "same point"),
     ];
     for (arguments, expected) in cases {
         let done = play(&folder, arguments);
         let said = String::from_utf8(done.stderr).unwrap();
         assert_eq!(done.status.code(), Some(2), "{arguments:?}: {said}");
-        assert!(
-            said.contains(expected) && said.trim_end().lines().count() == 1,
-            "{arguments:?}: {said}"
-        );
+        assert!(said.contains(expected) && said.trim_end().lines().count() == 1, "{arguments:?}: {said}");
         assert!(!folder.join("o.png").exists(), "{arguments:?}");
     }
-    for arguments in [
-        ["ball.dph", "--output", "o.png", "--frames", "0"],
-        ["ball.dph", "-x", "", "", ""],
-    ] {
+    for arguments in [["ball.dph", "--output", "o.png", "--frames", "0"], ["ball.dph", "-x", "", "", ""]] {
         assert_eq!(play(&folder, &arguments).status.code(), Some(2));
     }
 }

@@ -4,6 +4,7 @@ mod commands;
 
 use clap::{Parser, Subcommand};
 use commands::output::tell;
+use diaphane_formats::one_line;
 use std::process::ExitCode;
 
 /// Checks translucent assets against a ray-marched reference.
@@ -39,7 +40,7 @@ fn main() -> ExitCode {
             return ExitCode::SUCCESS;
         }
         Err(e) => {
-            tell(&commands::one_line(&commands::usage_error(&e)));
+            tell(&commands::usage_error(&e));
             return ExitCode::from(2);
         }
     };
@@ -53,7 +54,7 @@ fn main() -> ExitCode {
         Ok(true) => ExitCode::SUCCESS,
         Ok(false) => ExitCode::from(1),
         Err(e) => {
-            tell(&format!("error: {}", commands::one_line(&format!("{e:#}"))));
+            tell(&format!("error: {}", one_line(&format!("{e:#}"))));
             ExitCode::from(2)
         }
     }

@@ -71,20 +71,15 @@ pub fn compare(image: &Picture, reference: &Picture, coverage: &[f32]) -> Result
         ));
     }
     if pixels == 0 {
-        return Err(Error::invalid(
-            "no pixel is covered fully, so there is nothing to compare",
-        ));
+        return Err(Error::invalid("no pixel is covered fully, so there is nothing to compare"));
     }
     let n = r.len() as f64;
     let mean_square_error = i.iter().zip(&r).map(|(a, b)| (a - b) * (a - b)).sum::<f64>() / n;
     let mean_square = r.iter().map(|b| b * b).sum::<f64>() / n;
     let (mean_i, mean_r) = (i.iter().sum::<f64>() / n, r.iter().sum::<f64>() / n);
     let peak = percentile(&mut r.clone(), 99.9);
-    let mut relative: Vec<f64> = i
-        .iter()
-        .zip(&r)
-        .map(|(a, b)| ratio((a - b).abs(), b.max(0.01 * peak)))
-        .collect();
+    let mut relative: Vec<f64> =
+        i.iter().zip(&r).map(|(a, b)| ratio((a - b).abs(), b.max(0.01 * peak))).collect();
     Ok(Metrics {
         rel_rmse: ratio(mean_square_error, mean_square).sqrt(),
         psnr_db: if mean_square_error > 0.0 {
@@ -148,24 +143,15 @@ mod tests {
 
     #[test]
     fn only_full_coverage_counts() {
-        let m = compare(
-            &grey(&[1.0, 9.0, 1.0]),
-            &grey(&[1.0, 1.0, 2.0]),
-            &[1.0, 0.99, 1.0],
-        )
-        .unwrap();
+        let m = compare(&grey(&[1.0, 9.0, 1.0]), &grey(&[1.0, 1.0, 2.0]), &[1.0, 0.99, 1.0]).unwrap();
         assert_eq!(m.pixels, 2);
         assert!((m.rel_rmse - (0.5f64 / 2.5).sqrt()).abs() < 1e-12);
     }
 
     #[test]
     fn non_finite_values_count_everywhere_and_are_black() {
-        let m = compare(
-            &grey(&[f32::NAN, f32::INFINITY, 1.0]),
-            &grey(&[0.0, 3.0, 1.0]),
-            &[0.0, 1.0, 1.0],
-        )
-        .unwrap();
+        let m = compare(&grey(&[f32::NAN, f32::INFINITY, 1.0]), &grey(&[0.0, 3.0, 1.0]), &[0.0, 1.0, 1.0])
+            .unwrap();
         assert_eq!(m.non_finite, 6);
         assert!((m.rel_rmse - (4.5f64 / 5.0).sqrt()).abs() < 1e-12);
         assert!((m.bias - (0.5 / 2.0 - 1.0)).abs() < 1e-12);
@@ -178,41 +164,18 @@ mod tests {
         assert!(m.psnr_db.is_infinite());
         let m = compare(&grey(&[0.0]), &grey(&[0.0]), &[1.0]).unwrap();
         assert_eq!((m.rel_rmse, m.bias, m.p99_rel), (0.0, 0.0, 0.0));
-        assert!(
-            compare(&grey(&[0.5]), &grey(&[0.0]), &[1.0])
-                .unwrap()
-                .rel_rmse
-                .is_infinite()
-        );
+        assert!(compare(&grey(&[0.5]), &grey(&[0.0]), &[1.0]).unwrap().rel_rmse.is_infinite());
     }
 
     #[test]
     fn misfits_are_refused() {
         let one = grey(&[1.0]);
         assert!(
-            compare(&one, &grey(&[1.0, 2.0]), &[1.0; 2])
-                .unwrap_err()
-                .to_string()
-                .contains("differ in size")
+            compare(&one, &grey(&[1.0, 2.0]), &[1.0; 2]).unwrap_err().to_string().contains("differ in size")
         );
-        assert!(
-            compare(&one, &one, &[])
-                .unwrap_err()
-                .to_string()
-                .contains("coverage")
-        );
-        assert!(
-            compare(&one, &one, &[0.5])
-                .unwrap_err()
-                .to_string()
-                .contains("nothing to compare")
-        );
-        assert!(
-            compare(&one, &grey(&[f32::NAN]), &[1.0])
-                .unwrap_err()
-                .to_string()
-                .contains("not finite")
-        );
+        assert!(compare(&one, &one, &[]).unwrap_err().to_string().contains("coverage"));
+        assert!(compare(&one, &one, &[0.5]).unwrap_err().to_string().contains("nothing to compare"));
+        assert!(compare(&one, &grey(&[f32::NAN]), &[1.0]).unwrap_err().to_string().contains("not finite"));
     }
 
     #[test]

@@ -14,14 +14,7 @@ fn asset() -> Asset {
     let values = vec![1.0, 0.2, 0.2, 1.5];
     let grid = Grid::new([1, 4, 1], DVec3::splat(-1.0), DVec3::splat(1.0), values).unwrap();
     let phase = Phase::HenyeyGreenstein { g: 0.3 };
-    let medium = Medium::new(
-        DVec3::splat(2.0),
-        DVec3::splat(0.9),
-        phase,
-        1.3,
-        Density::Grid(grid),
-    )
-    .unwrap();
+    let medium = Medium::new(DVec3::splat(2.0), DVec3::splat(0.9), phase, 1.3, Density::Grid(grid)).unwrap();
     workbench::small_asset(&medium, 40)
 }
 
@@ -30,26 +23,12 @@ fn round_trip() {
     let asset = asset();
     let bytes = encode(&asset).unwrap();
     let sections = section_sizes(&bytes).unwrap();
-    for name in [
-        "info",
-        "weight",
-        "depth",
-        "boundary",
-        "mesh_positions",
-        "mesh_triangles",
-        "density",
-    ] {
-        assert!(
-            sections.iter().any(|(n, size)| *n == name && *size > 0),
-            "{name} is missing"
-        );
+    for name in ["info", "weight", "depth", "boundary", "mesh_positions", "mesh_triangles", "density"] {
+        assert!(sections.iter().any(|(n, size)| *n == name && *size > 0), "{name} is missing");
     }
     let read = parse(&bytes).unwrap();
     assert_eq!(read.info, asset.info);
-    assert_eq!(
-        (&read.mesh_positions, &read.mesh_triangles),
-        (&asset.mesh_positions, &asset.mesh_triangles)
-    );
+    assert_eq!((&read.mesh_positions, &read.mesh_triangles), (&asset.mesh_positions, &asset.mesh_triangles));
     assert_eq!(read.samples.position_radius, asset.samples.position_radius);
     // Coefficients lose to half precision once, and never again.
     assert_eq!(encode(&read).unwrap(), bytes);
@@ -64,10 +43,7 @@ fn round_trip() {
 fn every_truncation_is_an_error() {
     let bytes = encode(&asset()).unwrap();
     for length in 0..bytes.len() {
-        assert!(
-            parse(&bytes[..length]).is_err(),
-            "the first {length} bytes passed"
-        );
+        assert!(parse(&bytes[..length]).is_err(), "the first {length} bytes passed");
     }
 }
 

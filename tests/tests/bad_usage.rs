@@ -17,40 +17,16 @@ fn parameters() {
     ] {
         bench.refuses(
             "bake",
-            &[
-                "ball.obj",
-                "--material",
-                "m.toml",
-                "--output",
-                "o.dph",
-                option,
-                value,
-            ],
+            &["ball.obj", "--material", "m.toml", "--output", "o.dph", option, value],
             option,
         );
     }
     for value in ["0", "-1", "nan", "inf", "little"] {
         let tolerance = format!("--tolerance={value}");
-        let reference = [
-            "ball.obj",
-            "--material",
-            "m.toml",
-            "--scene",
-            "s.toml",
-            "--output",
-            "o.exr",
-            &tolerance,
-        ];
+        let reference =
+            ["ball.obj", "--material", "m.toml", "--scene", "s.toml", "--output", "o.exr", &tolerance];
         bench.refuses("validate", &reference.with("reference"), "tolerance");
-        let image = [
-            "ball.dph",
-            "ball.obj",
-            "--material",
-            "m.toml",
-            "--scene",
-            "s.toml",
-            "--max-error=-1",
-        ];
+        let image = ["ball.dph", "ball.obj", "--material", "m.toml", "--scene", "s.toml", "--max-error=-1"];
         bench.refuses("validate", &image.with("image"), "--max-error");
     }
     bench.refuses("validate", &["refrence"], "refrence");
@@ -72,15 +48,7 @@ fn outputs() {
     bench.write("s.exr", SCENE);
     bench.write("file", "in the way");
     let reference = |material: &str, scene: &str, output: &str, says: &str| {
-        let arguments = [
-            "ball.obj",
-            "--material",
-            material,
-            "--scene",
-            scene,
-            "--output",
-            output,
-        ];
+        let arguments = ["ball.obj", "--material", material, "--scene", scene, "--output", output];
         bench.refuses("validate", &arguments.with("reference"), says);
     };
     reference("m.toml", "s.toml", "nowhere/o.exr", "nowhere/o.exr");
@@ -94,41 +62,19 @@ fn outputs() {
         ("ball.obj", "both input and output"),
         ("./m.toml", "both input and output"),
     ] {
-        bench.refuses(
-            "bake",
-            &["ball.obj", "--material", "m.toml", "--output", output],
-            says,
-        );
+        bench.refuses("bake", &["ball.obj", "--material", "m.toml", "--output", output], says);
     }
-    for (output, says) in [
-        ("nowhere/o.exr", "nowhere/o.exr"),
-        ("o.gif", "o.gif"),
-        ("s.exr", "both input and output"),
-    ] {
+    for (output, says) in
+        [("nowhere/o.exr", "nowhere/o.exr"), ("o.gif", "o.gif"), ("s.exr", "both input and output")]
+    {
         bench.refuses(
             "play",
-            &[
-                "ball.dph",
-                "--scene",
-                "s.exr",
-                "--output",
-                output,
-                "--backend",
-                "cpu",
-            ],
+            &["ball.dph", "--scene", "s.exr", "--output", output, "--backend", "cpu"],
             says,
         );
     }
-    let image = [
-        "ball.dph",
-        "ball.obj",
-        "--material",
-        "m.toml",
-        "--scene",
-        "s.toml",
-        "--output-dir",
-        "file/o",
-    ];
+    let image =
+        ["ball.dph", "ball.obj", "--material", "m.toml", "--scene", "s.toml", "--output-dir", "file/o"];
     bench.refuses("validate", &image.with("image"), "file/o");
     bench.refuses("validate", &["demo", "--output-dir", "file/o"], "file/o");
 }
@@ -148,30 +94,10 @@ fn assets() {
     bench.write("cut.dph", &good[..good.len() - 1]);
     bench.write("foreign.dph", "PK\u{3}\u{4} another kind of file");
     bench.write("empty.dph", "");
-    for name in [
-        "missing.dph",
-        "future.dph",
-        "damaged.dph",
-        "cut.dph",
-        "foreign.dph",
-        "empty.dph",
-    ] {
-        bench.refuses(
-            "play",
-            &[name, "--scene", "s.toml", "--output", "o.exr", "--backend", "cpu"],
-            name,
-        );
+    for name in ["missing.dph", "future.dph", "damaged.dph", "cut.dph", "foreign.dph", "empty.dph"] {
+        bench.refuses("play", &[name, "--scene", "s.toml", "--output", "o.exr", "--backend", "cpu"], name);
         bench.refuses("bake", &["inspect", name], name);
-        let image = [
-            name,
-            "ball.obj",
-            "--material",
-            "m.toml",
-            "--scene",
-            "s.toml",
-            "--output-dir",
-            "o",
-        ];
+        let image = [name, "ball.obj", "--material", "m.toml", "--scene", "s.toml", "--output-dir", "o"];
         bench.refuses("validate", &image.with("image"), name);
     }
     bench.refuses("bake", &["inspect", "future.dph"], "version");
@@ -188,10 +114,7 @@ fn pictures() {
         (vec!["compare", "missing.exr", "small.exr"], "missing.exr"),
         (vec!["compare", "text.exr", "small.exr"], "text.exr"),
         (vec!["compare", "small.exr", "large.exr"], "differ in size"),
-        (
-            vec!["compare", "small.exr", "small.exr", "--coverage", "large.exr"],
-            "large.exr",
-        ),
+        (vec!["compare", "small.exr", "small.exr", "--coverage", "large.exr"], "large.exr"),
         (vec!["compare", "small.exr", "small.exr"], "nothing to compare"),
     ] {
         bench.refuses("validate", &arguments, says);

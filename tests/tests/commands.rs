@@ -21,12 +21,7 @@ const INPUTS: [&str; 5] = ["ball.obj", "--material", "m.toml", "--scene", "s.tom
 #[test]
 fn reference_writes_radiance_and_coverage() {
     let bench = Workbench::new();
-    let arguments = [
-        &["reference"],
-        &INPUTS[..],
-        &["--output", "r.exr", "--tolerance", "0.02"],
-    ]
-    .concat();
+    let arguments = [&["reference"], &INPUTS[..], &["--output", "r.exr", "--tolerance", "0.02"]].concat();
     let done = validate(&bench, &arguments);
     assert!(done.status.success(), "{done:?}");
     assert!(text(&done.stdout).contains("noise"));
@@ -48,10 +43,7 @@ fn reference_writes_radiance_and_coverage() {
 fn a_scene_without_lights_is_black_with_a_warning() {
     let bench = Workbench::new();
     bench.write("s.toml", SCENE.split("[[lights]]").next().unwrap());
-    let done = validate(
-        &bench,
-        &[&["reference"], &INPUTS[..], &["--output", "r.exr"]].concat(),
-    );
+    let done = validate(&bench, &[&["reference"], &INPUTS[..], &["--output", "r.exr"]].concat());
     assert!(done.status.success());
     assert!(text(&done.stderr).contains("no lights"));
     assert_eq!(support::brightest(&read_exr(&bench.path("r.exr")).unwrap()), 0.0);
@@ -78,10 +70,7 @@ fn compare_says_which_coverage_it_used() {
     assert!((all["rel_rmse"].as_f64().unwrap() - 0.2f64.sqrt()).abs() < 1e-9);
     assert!(all["coverage"].as_str().unwrap().contains("above 0"));
     let alpha = json(&["compare", "i.exr", "alpha.exr", "--json"]);
-    assert_eq!(
-        (alpha["rel_rmse"].as_f64(), alpha["pixels"].as_u64()),
-        (Some(0.0), Some(1))
-    );
+    assert_eq!((alpha["rel_rmse"].as_f64(), alpha["pixels"].as_u64()), (Some(0.0), Some(1)));
     assert!(alpha["coverage"].as_str().unwrap().contains("alpha"));
     let file = json(&["compare", "i.exr", "r.exr", "--coverage", "alpha.exr", "--json"]);
     assert_eq!(file["pixels"].as_u64(), Some(1));
@@ -93,25 +82,14 @@ fn compare_says_which_coverage_it_used() {
     // A picture with values that are not finite fails the check.
     image.pixels[0] = [f32::NAN; 3];
     write_exr(&bench.path("nan.exr"), &image).unwrap();
-    assert_eq!(
-        validate(&bench, &["compare", "nan.exr", "r.exr"]).status.code(),
-        Some(1)
-    );
+    assert_eq!(validate(&bench, &["compare", "nan.exr", "r.exr"]).status.code(), Some(1));
 }
 
 #[test]
 fn image_writes_pictures_map_and_report_and_judges() {
     let bench = Workbench::new();
-    let inputs = [
-        &["image", "ball.dph"],
-        &INPUTS[..],
-        &["--tolerance", "0.02", "--backend", "cpu"],
-    ]
-    .concat();
-    let done = validate(
-        &bench,
-        &[&inputs[..], &["--output-dir", "o", "--max-error", "0.5"]].concat(),
-    );
+    let inputs = [&["image", "ball.dph"], &INPUTS[..], &["--tolerance", "0.02", "--backend", "cpu"]].concat();
+    let done = validate(&bench, &[&inputs[..], &["--output-dir", "o", "--max-error", "0.5"]].concat());
     assert!(done.status.success(), "{done:?}");
     let files = [
         "played.exr",
@@ -139,10 +117,7 @@ fn image_writes_pictures_map_and_report_and_judges() {
     assert!((compared["rel_rmse"].as_f64().unwrap() - error).abs() < 1e-6);
     // One below, the other above.
     let strict = format!("{}", error * 0.99);
-    let done = validate(
-        &bench,
-        &[&inputs[..], &["--output-dir", "o", "--max-error", &strict]].concat(),
-    );
+    let done = validate(&bench, &[&inputs[..], &["--output-dir", "o", "--max-error", &strict]].concat());
     assert_eq!(done.status.code(), Some(1), "{done:?}");
     assert!(text(&done.stderr).contains("check failed"));
 }
@@ -150,23 +125,12 @@ fn image_writes_pictures_map_and_report_and_judges() {
 #[test]
 fn demo_tells_the_whole_story() {
     let bench = Workbench::new();
-    let done = validate(
-        &bench,
-        &[
-            "demo",
-            "--output-dir",
-            "o",
-            "--samples",
-            "1500",
-            "--backend",
-            "cpu",
-        ],
-    );
+    let done = validate(&bench, &["demo", "--output-dir", "o", "--samples", "1500", "--backend", "cpu"]);
     assert!(done.status.success(), "{}", text(&done.stderr));
     let table = text(&done.stdout);
-    for word in [
-        "samples", "bytes", "bake s", "frame ms", "rel_rmse", "PSNR", "noise", "statue", "cube", "block",
-    ] {
+    for word in
+        ["samples", "bytes", "bake s", "frame ms", "rel_rmse", "PSNR", "noise", "statue", "cube", "block"]
+    {
         assert!(table.contains(word), "{word} is missing: {table}");
     }
     let json: serde_json::Value =

@@ -23,9 +23,8 @@ fn never_names(krate: &str, others: &[&str]) {
     for file in files {
         let text = std::fs::read_to_string(&file).unwrap();
         // Comments may speak of other crates.
-        let code = text
-            .lines()
-            .filter(|l| !l.trim_start().starts_with("//") && !l.trim_start().starts_with('#'));
+        let code =
+            text.lines().filter(|l| !l.trim_start().starts_with("//") && !l.trim_start().starts_with('#'));
         for line in code {
             for other in others {
                 let names = [format!("diaphane-{other}"), format!("diaphane_{other}")];
@@ -68,9 +67,7 @@ fn the_reference_uses_no_baked_data_and_no_shared_integral() {
             "diaphane_bake",
             "diaphane_runtime",
         ] {
-            let used = text
-                .lines()
-                .any(|l| !l.trim_start().starts_with("//") && l.contains(word));
+            let used = text.lines().any(|l| !l.trim_start().starts_with("//") && l.contains(word));
             assert!(!used, "{} uses {word}", file.display());
         }
     }

@@ -17,11 +17,7 @@ fn medium(kappa: f64, ior: f64, density: Density) -> Medium {
 }
 
 fn layers() -> Density {
-    Density::Layers(Layers {
-        axis: DVec3::new(0.6, 0.8, 0.0),
-        period: 0.5,
-        densities: vec![1.0, 0.2],
-    })
+    Density::Layers(Layers { axis: DVec3::new(0.6, 0.8, 0.0), period: 0.5, densities: vec![1.0, 0.2] })
 }
 
 #[test]
@@ -56,10 +52,7 @@ fn divergence_of_the_first_moment_is_extinction_times_fluence() {
                 }
             }
             let expected = 3.0 * rho(x) * fluence;
-            assert!(
-                (divergence / expected - 1.0).abs() < 2e-3,
-                "{x}: {divergence} {expected}"
-            );
+            assert!((divergence / expected - 1.0).abs() < 2e-3, "{x}: {divergence} {expected}");
         }
     }
 }
@@ -70,9 +63,7 @@ fn chords_of_a_ball_lie_between_those_of_its_bounds() {
     let mesh = shapes::icosphere(1.0, 5).to_mesh().unwrap();
     let accel = Accel::new(&mesh);
     let nearest = |i: usize| mesh.area_normal(i).normalize().dot(mesh.corners(i)[0]);
-    let inner = (0..mesh.triangles.len())
-        .map(nearest)
-        .fold(f64::INFINITY, f64::min);
+    let inner = (0..mesh.triangles.len()).map(nearest).fold(f64::INFINITY, f64::min);
     assert!(inner > 0.999);
     let medium = medium(1.0, 1.0, Density::Uniform(1.0));
     let points: Vec<DVec3> = points_inside(&mesh, &accel, 200, 1.0 - inner + 1e-6);
@@ -91,10 +82,7 @@ fn chords_of_a_ball_lie_between_those_of_its_bounds() {
                 (f64::from(rows.backward[i]), -w),
             ] {
                 let (least, most) = (chord(*x, along, inner), chord(*x, along, 1.0));
-                assert!(
-                    got > least - 1e-6 && got < most + 1e-6,
-                    "{x} {along}: {got} not in {least}..{most}"
-                );
+                assert!(got > least - 1e-6 && got < most + 1e-6, "{x} {along}: {got} not in {least}..{most}");
             }
         }
     }
@@ -111,16 +99,8 @@ fn agreement(name: &str, shape: &Triangles, medium: &Medium) {
             for (side, along, got) in [(0, w, rows.forward[i]), (1, -w, rows.backward[i])] {
                 let traced = depth_along(&accel, medium, *x, along, f64::INFINITY, &mut Vec::new());
                 let difference = (f64::from(got) - traced.density_length).abs();
-                assert!(
-                    difference < close,
-                    "{name} at {x} along {along}: {got} {}",
-                    traced.density_length
-                );
-                assert_eq!(
-                    i32::from(rows.winding[side][i]),
-                    traced.winding,
-                    "{name} at {x} along {along}"
-                );
+                assert!(difference < close, "{name} at {x} along {along}: {got} {}", traced.density_length);
+                assert_eq!(i32::from(rows.winding[side][i]), traced.winding, "{name} at {x} along {along}");
                 if medium.ior() != 1.0 {
                     let difference = (f64::from(rows.boundary[side][i]) - traced.boundary).abs();
                     assert!(difference < 1e-5, "{name} at {x} along {along}: boundary");

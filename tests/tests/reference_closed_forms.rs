@@ -15,10 +15,7 @@ use validation::metrics::compare;
 use validation::reference::{Settings, render};
 
 fn picture(mesh: &Mesh, medium: &Medium, scene: &Scene, tolerance: f64) -> Picture {
-    let settings = Settings {
-        tolerance,
-        ..Settings::default()
-    };
+    let settings = Settings { tolerance, ..Settings::default() };
     let reference = render(mesh, medium, scene, &settings, &|_| ()).unwrap();
     assert!(reference.converged);
     reference.picture
@@ -39,9 +36,7 @@ fn homogeneous_ball_matches_chord_lengths() {
     // 327,680 triangles, scaled so that their volume is the ball's: chords are off by a few 1e-6.
     let mut ball = icosphere(1.0, 7);
     let volume = ball.to_mesh().unwrap().volume();
-    ball.positions
-        .iter_mut()
-        .for_each(|p| *p *= (4.0 / 3.0 * PI / volume).cbrt());
+    ball.positions.iter_mut().for_each(|p| *p *= (4.0 / 3.0 * PI / volume).cbrt());
     let scene = scene(
         "[camera]\nposition=[0,0,4]\ntarget=[0,0,0]\nvertical_fov_degrees=32\n[image]\nwidth=64\nheight=64\n\
          [[lights]]\ntype='point'\nposition=[3,0,0]\nintensity=[100,50,10]\n\
@@ -66,10 +61,7 @@ fn homogeneous_ball_matches_chord_lengths() {
             let p = frame.origin + d * (start + u * length);
             let to = DVec3::new(3.0, 0.0, 0.0) - p;
             let lights = [
-                (
-                    to.normalize(),
-                    DVec3::new(100.0, 50.0, 10.0) / to.length_squared(),
-                ),
+                (to.normalize(), DVec3::new(100.0, 50.0, 10.0) / to.length_squared()),
                 (DVec3::new(-0.6, 0.8, 0.0), DVec3::new(0.0, 3.0, 7.0)),
             ];
             for (towards, irradiance) in lights {
@@ -93,10 +85,7 @@ fn homogeneous_ball_matches_chord_lengths() {
         *value = sum.as_vec3().to_array();
     }
     let m = compare(&got, &wanted, got.coverage.as_ref().unwrap()).unwrap();
-    println!(
-        "rel_rmse {:.6}, bias {:+.6}, {} pixels",
-        m.rel_rmse, m.bias, m.pixels
-    );
+    println!("rel_rmse {:.6}, bias {:+.6}, {} pixels", m.rel_rmse, m.bias, m.pixels);
     assert!(m.rel_rmse <= 1e-3 && m.bias.abs() < 2e-4, "{m:?}");
 }
 
@@ -117,36 +106,14 @@ const BACK: &str = "[[lights]]\ntype='directional'\ndirection=[0,0,1]\nirradianc
 fn any_density_lit_along_the_view_depends_on_its_mass_only() {
     // From the front ∫ κρ e^{-2κm} E/4π dz = (1 - e^{-2κM}) E/8π, from behind ∫ κρ e^{-κM} E/4π dz = κM e^{-κM} E/4π,
     // with M = ∫ρ dz through the box, whatever the arrangement.
-    let values = (0..6 * 5 * 9)
-        .map(|i| ((i * 7 + i / 5) % 11) as f32 * 0.3)
-        .collect();
-    let solid = |solid, density| Shape {
-        solid,
-        density,
-        absorb: false,
-    };
-    let torus = Solid::Torus {
-        center: DVec3::ZERO,
-        axis: DVec3::new(0.0, 0.6, 0.8),
-        radius: 0.2,
-        tube: 0.15,
-    };
+    let values = (0..6 * 5 * 9).map(|i| ((i * 7 + i / 5) % 11) as f32 * 0.3).collect();
+    let solid = |solid, density| Shape { solid, density, absorb: false };
+    let torus =
+        Solid::Torus { center: DVec3::ZERO, axis: DVec3::new(0.0, 0.6, 0.8), radius: 0.2, tube: 0.15 };
     let shapes = vec![
         solid(torus, 5.0),
-        solid(
-            Solid::Sphere {
-                center: DVec3::new(0.1, 0.0, 0.3),
-                radius: 0.2,
-            },
-            2.0,
-        ),
-        solid(
-            Solid::Box {
-                min: DVec3::splat(-0.5),
-                max: DVec3::new(0.3, 0.2, -0.2),
-            },
-            0.2,
-        ),
+        solid(Solid::Sphere { center: DVec3::new(0.1, 0.0, 0.3), radius: 0.2 }, 2.0),
+        solid(Solid::Box { min: DVec3::splat(-0.5), max: DVec3::new(0.3, 0.2, -0.2) }, 0.2),
     ];
     let fields = [
         Density::Uniform(1.3),
@@ -156,12 +123,7 @@ fn any_density_lit_along_the_view_depends_on_its_mass_only() {
             densities: vec![1.0, 0.2, 3.0],
         }),
         Density::Grid(Grid::new([6, 5, 9], DVec3::splat(-0.8), DVec3::splat(0.9), values).unwrap()),
-        Density::Noise(Noise {
-            seed: 3,
-            frequency: 3.0,
-            octaves: 3,
-            range: [0.2, 1.8],
-        }),
+        Density::Noise(Noise { seed: 3, frequency: 3.0, octaves: 3, range: [0.2, 1.8] }),
         Density::Shapes(Shapes { base: 0.7, shapes }),
     ];
     for field in fields {
@@ -174,16 +136,8 @@ fn any_density_lit_along_the_view_depends_on_its_mass_only() {
         let back = kappa * mass * (-kappa * mass).exp() * 8.0 / (4.0 * PI);
         let (got_front, got_back) = (slab_value(&medium, FRONT), slab_value(&medium, BACK));
         println!("M {mass:.4}: front {got_front:.6} of {front:.6}, back {got_back:.6} of {back:.6}");
-        assert!(
-            (got_front / front - 1.0).abs() < 1e-3,
-            "{:?}",
-            medium.density_field()
-        );
-        assert!(
-            (got_back / back - 1.0).abs() < 1e-3,
-            "{:?}",
-            medium.density_field()
-        );
+        assert!((got_front / front - 1.0).abs() < 1e-3, "{:?}", medium.density_field());
+        assert!((got_back / back - 1.0).abs() < 1e-3, "{:?}", medium.density_field());
     }
 }
 
@@ -192,18 +146,9 @@ fn an_absorbing_inclusion_hides_what_lies_behind_it() {
     // A ball of density 3 that scatters nothing between 0.25 and -0.25 (radius √(0.25² + 0.13² + 0.07²)) in a box of
     // density 1: lit from the front, the eye sees the 0.45 in front and, through twice 3 · 0.5, the 0.45 behind.
     let radius = (0.25f64.powi(2) + 0.13f64.powi(2) + 0.07f64.powi(2)).sqrt();
-    let solid = Solid::Sphere {
-        center: DVec3::ZERO,
-        radius,
-    };
-    let field = Density::Shapes(Shapes {
-        base: 1.0,
-        shapes: vec![Shape {
-            solid,
-            density: 3.0,
-            absorb: true,
-        }],
-    });
+    let solid = Solid::Sphere { center: DVec3::ZERO, radius };
+    let field =
+        Density::Shapes(Shapes { base: 1.0, shapes: vec![Shape { solid, density: 3.0, absorb: true }] });
     let medium = Medium::new(DVec3::ONE, DVec3::ONE, Phase::Isotropic, 1.0, field).unwrap();
     let part = |from: f64, to: f64| (-2.0 * from).exp() - (-2.0 * to).exp();
     let exact = (part(0.0, 0.45) + part(1.95, 2.4)) * 8.0 / (8.0 * PI);
@@ -253,10 +198,7 @@ fn a_thin_medium_in_a_white_environment_glows_like_its_chord() {
         let mut s = scene(NARROW);
         let mut sky = Picture::new(16, 8);
         sky.pixels.fill([0.5; 3]);
-        s.environment = Some(Environment {
-            picture: sky,
-            scale: 2.0,
-        });
+        s.environment = Some(Environment { picture: sky, scale: 2.0 });
         let p = picture(&mesh, &uniform(1e-6, phase, 1.0), &s, 1e-3);
         let got = f64::from(p.pixels[0][0]) / 1.4e-6;
         assert!((got - 1.0).abs() < 3e-3, "{got}");
@@ -273,18 +215,11 @@ fn a_furnace_is_never_exceeded() {
     );
     let mut sky = Picture::new(16, 8);
     sky.pixels.fill([1.0; 3]);
-    s.environment = Some(Environment {
-        picture: sky,
-        scale: 1.0,
-    });
+    s.environment = Some(Environment { picture: sky, scale: 1.0 });
     let frame = s.ray_frame().unwrap();
     for kappa in [0.1, 1.0, 4.0] {
         let p = picture(&mesh, &uniform(kappa, Phase::Isotropic, 1.0), &s, 4e-3);
-        for (i, value) in p
-            .pixels
-            .iter()
-            .enumerate()
-            .filter(|(i, _)| p.coverage.as_ref().unwrap()[*i] == 1.0)
+        for (i, value) in p.pixels.iter().enumerate().filter(|(i, _)| p.coverage.as_ref().unwrap()[*i] == 1.0)
         {
             // The pixel's chord lies between those of its corners nearest to and farthest from the centre.
             let corners = [(0, 0), (0, 1), (1, 0), (1, 1)].map(|(x, y)| {
@@ -296,16 +231,9 @@ fn a_furnace_is_never_exceeded() {
             let shortest = corners.iter().fold(2.0f64, |m, c| m.min(*c)) * 0.98;
             let met = |chord: f64| 1.0 - (-kappa * chord).exp();
             let value = f64::from(value[0]);
-            assert!(
-                value < met(longest) * 1.05,
-                "κ {kappa}, pixel {i}: {value} above {}",
-                met(longest)
-            );
+            assert!(value < met(longest) * 1.05, "κ {kappa}, pixel {i}: {value} above {}", met(longest));
             let least = met(shortest) * (-2.0 * kappa).exp();
-            assert!(
-                value > least * 0.95,
-                "κ {kappa}, pixel {i}: {value} below {least}"
-            );
+            assert!(value > least * 0.95, "κ {kappa}, pixel {i}: {value} below {least}");
         }
     }
 }

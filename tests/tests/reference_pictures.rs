@@ -18,10 +18,7 @@ fn matches(case: &str, mesh_name: &str, tolerance: f64) {
     let (mesh, _) = mesh::load_obj(&file(format!("meshes/{mesh_name}.obj"))).unwrap();
     let medium = material::load(&file(format!("{case}.material.toml"))).unwrap();
     let scene = scene::load(&file(format!("{case}.scene.toml"))).unwrap();
-    let settings = Settings {
-        tolerance,
-        ..Settings::default()
-    };
+    let settings = Settings { tolerance, ..Settings::default() };
     let own = render(&mesh, &medium, &scene, &settings, &|_| ()).unwrap();
     let (_, _, coverage) = picture::read_coverage(&file(format!("images/{case}_cov.npy"))).unwrap();
     let theirs = picture::read_exr(&file(format!("images/{case}.exr"))).unwrap();
@@ -34,14 +31,8 @@ fn matches(case: &str, mesh_name: &str, tolerance: f64) {
     assert!(m.rel_rmse <= f64::max(0.01, 2.0 * noise), "{case}: {m:?}");
     assert!(m.bias.abs() <= 0.003, "{case}: {m:?}");
     // Both sides count 16 × 16 rays along edges.
-    let differ = own
-        .picture
-        .coverage
-        .unwrap()
-        .iter()
-        .zip(&coverage)
-        .filter(|(a, b)| (*a - *b).abs() > 0.05)
-        .count();
+    let differ =
+        own.picture.coverage.unwrap().iter().zip(&coverage).filter(|(a, b)| (*a - *b).abs() > 0.05).count();
     assert!(differ <= 40, "{case}: coverage differs in {differ} pixels");
 }
 

@@ -19,33 +19,11 @@ fn distance(p: DVec3) -> f64 {
     let side = DVec3::new(p.x, p.y, p.z.abs());
     let body = ellipsoid(p, DVec3::new(-0.03, 0.0, 0.0), DVec3::new(0.52, 0.37, 0.36), 28.0);
     let head = (p - DVec3::new(0.36, 0.42, 0.0)).length() - 0.25;
-    let beak = cone(
-        p,
-        DVec3::new(0.55, 0.42, 0.0),
-        DVec3::new(0.77, 0.36, 0.0),
-        0.1,
-        0.03,
-    );
-    let tail = ellipsoid(
-        p,
-        DVec3::new(-0.66, -0.27, 0.0),
-        DVec3::new(0.36, 0.07, 0.17),
-        20.0,
-    );
-    let wing = ellipsoid(
-        side,
-        DVec3::new(-0.16, 0.02, 0.33),
-        DVec3::new(0.44, 0.2, 0.1),
-        24.0,
-    );
+    let beak = cone(p, DVec3::new(0.55, 0.42, 0.0), DVec3::new(0.77, 0.36, 0.0), 0.1, 0.03);
+    let tail = ellipsoid(p, DVec3::new(-0.66, -0.27, 0.0), DVec3::new(0.36, 0.07, 0.17), 20.0);
+    let wing = ellipsoid(side, DVec3::new(-0.16, 0.02, 0.33), DVec3::new(0.44, 0.2, 0.1), 24.0);
     let eye = (side - DVec3::new(0.455, 0.49, 0.205)).length() - 0.05;
-    let leg = cone(
-        side,
-        DVec3::new(0.02, -0.3, 0.15),
-        DVec3::new(0.06, -0.68, 0.16),
-        0.085,
-        0.06,
-    );
+    let leg = cone(side, DVec3::new(0.02, -0.3, 0.15), DVec3::new(0.06, -0.68, 0.16), 0.085, 0.06);
     let plinth = plinth(p - DVec3::new(0.0, -0.76, 0.0), 0.5, 0.09, 0.04);
     let mut d = blend(body, head, 0.2);
     d = blend(d, tail, 0.14);
@@ -67,11 +45,7 @@ fn ellipsoid(p: DVec3, centre: DVec3, radii: DVec3, degrees: f64) -> f64 {
     let q = DMat3::from_rotation_z(-degrees.to_radians()) * (p - centre);
     let k0 = (q / radii).length();
     let k1 = (q / (radii * radii)).length();
-    if k1 > 0.0 {
-        k0 * (k0 - 1.0) / k1
-    } else {
-        -radii.min_element()
-    }
+    if k1 > 0.0 { k0 * (k0 - 1.0) / k1 } else { -radii.min_element() }
 }
 
 /// The hull of two balls.

@@ -10,11 +10,7 @@ const RIM: usize = 3;
 
 /// A box around the origin, `half` its half edges, each face in `cells` × `cells` squares.
 pub fn cuboid(half: [f64; 3], cells: usize) -> Triangles {
-    let lines = half.map(|h| {
-        (0..=cells)
-            .map(|i| h * (2.0 * i as f64 / cells as f64 - 1.0))
-            .collect()
-    });
+    let lines = half.map(|h| (0..=cells).map(|i| h * (2.0 * i as f64 / cells as f64 - 1.0)).collect());
     faces(&lines)
 }
 
@@ -58,11 +54,7 @@ fn faces(lines: &[Vec<f64>; 3]) -> Triangles {
                     };
                     let (a, b) = (vertex(i, j), vertex(i + 1, j));
                     let (c, d) = (vertex(i + 1, j + 1), vertex(i, j + 1));
-                    let outwards = if side == 1 {
-                        [[a, b, c], [a, c, d]]
-                    } else {
-                        [[a, c, b], [a, d, c]]
-                    };
+                    let outwards = if side == 1 { [[a, b, c], [a, c, d]] } else { [[a, c, b], [a, d, c]] };
                     t.triangles.extend(outwards);
                 }
             }

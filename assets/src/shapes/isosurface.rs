@@ -45,11 +45,7 @@ pub fn isosurface(low: DVec3, high: DVec3, cells: usize, value: impl Fn(DVec3) -
                     let (u, v) = (I64Vec3::AXES[(axis + 1) % 3], I64Vec3::AXES[(axis + 2) % 3]);
                     let cell = I64Vec3::from_array(here.map(|n| n as i64));
                     let [a, b, c, d] = [cell - u - v, cell - v, cell, cell - u].map(|k| corner(&mut t, k));
-                    t.triangles.extend(if inside {
-                        [[a, b, c], [a, c, d]]
-                    } else {
-                        [[a, c, b], [a, d, c]]
-                    });
+                    t.triangles.extend(if inside { [[a, b, c], [a, c, d]] } else { [[a, c, b], [a, d, c]] });
                 }
             }
         }

@@ -59,10 +59,7 @@ mod tests {
                 assert!(edges.insert(edge), "edge {edge:?} is used twice in one direction");
             }
         }
-        assert!(
-            edges.iter().all(|(a, b)| edges.contains(&(*b, *a))),
-            "the surface has a hole"
-        );
+        assert!(edges.iter().all(|(a, b)| edges.contains(&(*b, *a))), "the surface has a hole");
         t.triangles
             .iter()
             .map(|i| {
@@ -104,9 +101,7 @@ mod tests {
     #[test]
     fn obj_text_keeps_single_precision() {
         let t = icosphere(0.3, 2);
-        let mesh = diaphane_formats::mesh::parse_obj(t.to_obj().as_bytes())
-            .unwrap()
-            .0;
+        let mesh = diaphane_formats::mesh::parse_obj(t.to_obj().as_bytes()).unwrap().0;
         assert_eq!(mesh.triangles.len(), t.triangles.len());
         let single: Vec<_> = t.positions.iter().map(|p| p.as_vec3().as_dvec3()).collect();
         assert!(mesh.positions.iter().all(|p| single.contains(p)));

@@ -44,7 +44,8 @@ impl DistanceGrid {
     pub fn depth_near(&self, p: DVec3) -> Option<f64> {
         let s = ((p - self.origin) / self.cell).round();
         let inside = (0..3).all(|k| s[k] >= 0.0 && s[k] < self.size[k] as f64);
-        let depth = inside.then(|| f64::from(self.depth[self.index(s.x as usize, s.y as usize, s.z as usize)]))?;
+        let depth =
+            inside.then(|| f64::from(self.depth[self.index(s.x as usize, s.y as usize, s.z as usize)]))?;
         (depth > 0.0).then_some(depth)
     }
 
@@ -112,8 +113,9 @@ impl<'a> Shape<'a> {
 pub(crate) fn inside_nodes(mesh: &Mesh, nodes: &[DVec3]) -> Result<Vec<bool>> {
     let unit = Medium::new(DVec3::ONE, DVec3::ZERO, Phase::Isotropic, 1.0, Density::Uniform(1.0))?;
     let axes = even_directions(6, 0x5eed);
-    let votes: Vec<_> = [axes[0], axes[2], axes[4]].par_iter().map(|axis| project(mesh, &unit, nodes, *axis).winding).collect();
-    Ok((0..nodes.len())
-        .map(|i| votes.iter().flatten().filter(|w| w[i] > 0).count() > 3)
-        .collect())
+    let votes: Vec<_> = [axes[0], axes[2], axes[4]]
+        .par_iter()
+        .map(|axis| project(mesh, &unit, nodes, *axis).winding)
+        .collect();
+    Ok((0..nodes.len()).map(|i| votes.iter().flatten().filter(|w| w[i] > 0).count() > 3).collect())
 }

@@ -20,7 +20,12 @@ const REACH: f64 = 0.8;
 const TRIES: usize = 3;
 
 /// `count` points for each sample, row-major [sample][point].
-pub(super) fn points(shape: &Shape<'_>, samples: &[Candidate], count: usize, seed: u64) -> Result<Vec<DVec3>> {
+pub(super) fn points(
+    shape: &Shape<'_>,
+    samples: &[Candidate],
+    count: usize,
+    seed: u64,
+) -> Result<Vec<DVec3>> {
     if count <= 1 {
         return Ok(samples.iter().map(|s| s.position).collect());
     }
@@ -39,8 +44,7 @@ pub(super) fn points(shape: &Shape<'_>, samples: &[Candidate], count: usize, see
         .enumerate()
         .flat_map_iter(|(i, s)| {
             let own = i * width..(i + 1) * width;
-            let mut kept: Vec<DVec3> =
-                own.filter(|k| inside[*k]).map(|k| tries[k]).take(count).collect();
+            let mut kept: Vec<DVec3> = own.filter(|k| inside[*k]).map(|k| tries[k]).take(count).collect();
             if kept.is_empty() {
                 kept.push(s.position);
             }

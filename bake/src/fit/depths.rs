@@ -112,7 +112,10 @@ pub(crate) fn depths(
     let kept_only = |i: &usize| keep[*i];
     Ok(Lit {
         samples: (0..n).filter(kept_only).map(|i| placed.samples[i]).collect(),
-        centroids: (0..n).filter(kept_only).map(|i| mean(&points[i * per_sample..(i + 1) * per_sample])).collect(),
+        centroids: (0..n)
+            .filter(kept_only)
+            .map(|i| mean(&points[i * per_sample..(i + 1) * per_sample]))
+            .collect(),
         probes: placed.probes,
         directions,
         transmittance,

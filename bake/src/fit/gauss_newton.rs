@@ -27,7 +27,14 @@ impl Solver {
     }
 
     /// Solves min Σ_d g_d² (Σ_k B_dk x_k - y_d)² + damping · mean(g²) · |x|² and writes x; false if it cannot.
-    pub fn solve(&mut self, basis: &Basis, slope: &[f32], target: &[f32], damping: f64, x: &mut [f32]) -> bool {
+    pub fn solve(
+        &mut self,
+        basis: &Basis,
+        slope: &[f32],
+        target: &[f32],
+        damping: f64,
+        x: &mut [f32],
+    ) -> bool {
         let n = basis.columns;
         self.normal.fill(0.0);
         self.right.fill(0.0);

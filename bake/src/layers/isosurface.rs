@@ -8,8 +8,13 @@ use std::collections::HashMap;
 
 /// The surface depth = `level`; normals point deeper.
 pub(super) fn extract(grid: &DistanceGrid, level: f32) -> Layer {
-    let mut layer =
-        Layer { offset: 0.0, thickness: 0.0, positions: Vec::new(), inward: Vec::new(), triangles: Vec::new() };
+    let mut layer = Layer {
+        offset: 0.0,
+        thickness: 0.0,
+        positions: Vec::new(),
+        inward: Vec::new(),
+        triangles: Vec::new(),
+    };
     let [nx, ny, nz] = grid.size;
     let mut vertex_of_cell: HashMap<usize, u32> = HashMap::new();
     for k in 0..nz - 1 {

@@ -28,7 +28,12 @@ pub(crate) struct Layer {
 /// Each slab is this much thicker than the one above it.
 const GROWTH: f64 = 1.25;
 
-pub(crate) fn build(shape: &Shape<'_>, medium: &Medium, params: &Params, stage: Stage<'_>) -> Result<Vec<Layer>> {
+pub(crate) fn build(
+    shape: &Shape<'_>,
+    medium: &Medium,
+    params: &Params,
+    stage: Stage<'_>,
+) -> Result<Vec<Layer>> {
     let deepest = shape.grid.depth.iter().copied().fold(0.0, f32::max) as f64;
     // Slabs no thicker than the samples' spacing or half a mean free path near the surface.
     let kappa = medium.reference_extinction().max(1e-9 / shape.diagonal);

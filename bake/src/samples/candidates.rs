@@ -99,7 +99,8 @@ fn patches(layers: &[Layer], fluence: &LayerFluence, medium: &Medium) -> Vec<Pat
     for (l, layer) in layers.iter().enumerate() {
         for (t, corners) in layer.triangles.iter().enumerate() {
             let [a, b, c] = corners.map(|v| layer.positions[v as usize]);
-            let mean = |values: &[f32]| corners.iter().map(|v| f64::from(values[*v as usize])).sum::<f64>() / 3.0;
+            let mean =
+                |values: &[f32]| corners.iter().map(|v| f64::from(values[*v as usize])).sum::<f64>() / 3.0;
             let light = 0.5 * (mean(&fluence.top[l]) + mean(&fluence.bottom[l]));
             if mean(&fluence.top[l]).max(mean(&fluence.bottom[l])) < DARK {
                 continue;

@@ -73,7 +73,8 @@ fn snap_to_boundary(shape: &Shape<'_>, samples: &mut [Candidate]) -> usize {
             let mut moved = 0;
             if let Some(n) = shape.accel.nearest(s.position, reach) {
                 // Along the way from the surface to the sample, so that edges and corners work too.
-                let inward = (s.position - n.point).try_normalize().unwrap_or(-shape.accel.normal(n.triangle));
+                let inward =
+                    (s.position - n.point).try_normalize().unwrap_or(-shape.accel.normal(n.triangle));
                 s.position = n.point + inward * margin;
                 moved = 1;
             }

@@ -139,7 +139,8 @@ pub(super) fn open(bytes: &[u8], version: u32) -> Result<Vec<Section<'_>>> {
     let mut at = head;
     for i in 0..count {
         let entry = HEADER + ENTRY * i;
-        let (kind, crc, offset, length) = (u32_at(entry), u32_at(entry + 4), u64_at(entry + 8), u64_at(entry + 16));
+        let (kind, crc, offset, length) =
+            (u32_at(entry), u32_at(entry + 4), u64_at(entry + 8), u64_at(entry + 16));
         let damaged = || Error::invalid(format!("section {kind} of the asset is damaged (checksum)"));
         let length = usize::try_from(length).map_err(|_| damaged())?;
         let end = at.checked_add(length).map(align).filter(|&e| e <= bytes.len()).ok_or_else(damaged)?;

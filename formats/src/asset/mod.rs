@@ -126,7 +126,11 @@ impl Asset {
         let n = self.samples.len();
         let k = coefficient_count(self.info.order as usize);
         let fail = |what: &str| Err(Error::invalid(format!("the asset's {what} do not fit together")));
-        if self.info.samples as usize != n || self.samples.weight.len() != n || self.samples.offset.len() != n || self.samples.depth.len() != n * k {
+        if self.info.samples as usize != n
+            || self.samples.weight.len() != n
+            || self.samples.offset.len() != n
+            || self.samples.depth.len() != n * k
+        {
             return fail("sample sections");
         }
         let boundary = if self.info.ior == 1.0 { 0 } else { n * k };
@@ -144,7 +148,8 @@ impl Asset {
         self.mesh()?;
         if let Some(grid) = &self.density {
             let count = grid.size.iter().try_fold(1usize, |a, &n| a.checked_mul(n as usize));
-            let bounds_fit = (0..3).all(|i| grid.min[i] < grid.max[i] && (grid.max[i] - grid.min[i]).is_finite());
+            let bounds_fit =
+                (0..3).all(|i| grid.min[i] < grid.max[i] && (grid.max[i] - grid.min[i]).is_finite());
             let values_fit = grid.values.iter().flatten().all(|v| v.is_finite() && v.to_f32() >= 0.0);
             if count != Some(grid.values.len()) || grid.values.is_empty() || !bounds_fit || !values_fit {
                 return fail("density grid values");

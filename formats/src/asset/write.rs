@@ -15,7 +15,8 @@ pub fn encode(asset: &Asset) -> Result<Vec<u8>> {
     let halves = |values: &[f32]| -> Vec<u8> {
         values.iter().flat_map(|v| f16::from_f32(v.clamp(-65504.0, 65504.0)).to_le_bytes()).collect()
     };
-    let floats = |values: &mut dyn Iterator<Item = f32>| -> Vec<u8> { values.flat_map(f32::to_le_bytes).collect() };
+    let floats =
+        |values: &mut dyn Iterator<Item = f32>| -> Vec<u8> { values.flat_map(f32::to_le_bytes).collect() };
     let s = &asset.samples;
     let mut sections = vec![
         (Kind::Info, codec::encode(&asset.info)?),

@@ -117,7 +117,8 @@ pub(super) fn march(
     let mut sum = 0.0;
     for i in 0..steps as usize {
         let middle = start + (i as f64 + 0.5) * h;
-        sum += value(origin + direction * (middle - OFFSET * h)) + value(origin + direction * (middle + OFFSET * h));
+        sum += value(origin + direction * (middle - OFFSET * h))
+            + value(origin + direction * (middle + OFFSET * h));
     }
     0.5 * sum * h
 }
@@ -128,15 +129,16 @@ mod tests {
 
     #[test]
     fn layers_integrate_exactly() {
-        let layers =
-            Layers { axis: DVec3::new(0.6, 0.8, 0.0), period: 0.25, densities: vec![1.0, 0.2, 3.0] };
+        let layers = Layers { axis: DVec3::new(0.6, 0.8, 0.0), period: 0.25, densities: vec![1.0, 0.2, 3.0] };
         let density = Density::Layers(layers.clone());
         let origin = DVec3::new(-0.31, 0.2, 0.7);
-        for direction in [DVec3::new(0.0, 1.0, 0.0), DVec3::new(0.48, -0.6, 0.64), DVec3::new(-0.8, 0.6, 0.0)] {
+        for direction in [DVec3::new(0.0, 1.0, 0.0), DVec3::new(0.48, -0.6, 0.64), DVec3::new(-0.8, 0.6, 0.0)]
+        {
             let exact = density.integral(origin, direction, 0.1, 1.7);
             let n = 400_000;
             let h = 1.6 / n as f64;
-            let sum: f64 = (0..n).map(|i| layers.value(origin + direction * (0.1 + (i as f64 + 0.5) * h))).sum();
+            let sum: f64 =
+                (0..n).map(|i| layers.value(origin + direction * (0.1 + (i as f64 + 0.5) * h))).sum();
             // At most 16 steps of the density fall into some cell of the sum: each costs up to h · 2.8 / 2.
             assert!((exact - sum * h).abs() < 16.0 * 1.4 * h, "{direction}: {exact} {}", sum * h);
         }

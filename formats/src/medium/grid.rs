@@ -25,10 +25,15 @@ impl Grid {
     pub fn new(size: [usize; 3], min: DVec3, max: DVec3, values: Vec<f32>) -> Result<Self> {
         let count = size.iter().try_fold(1usize, |a, &n| a.checked_mul(n));
         if count != Some(values.len()) || values.is_empty() {
-            return Err(Error::invalid(format!("a grid of {size:?} voxels does not fit {} values", values.len())));
+            return Err(Error::invalid(format!(
+                "a grid of {size:?} voxels does not fit {} values",
+                values.len()
+            )));
         }
         if !(min.is_finite() && max.is_finite() && min.cmplt(max).all()) {
-            return Err(Error::invalid(format!("grid bounds must be finite with min below max, not {min} .. {max}")));
+            return Err(Error::invalid(format!(
+                "grid bounds must be finite with min below max, not {min} .. {max}"
+            )));
         }
         if let Some(bad) = values.iter().find(|v| !v.is_finite() || **v < 0.0) {
             return Err(Error::invalid(format!("grid values must be finite and not negative, found {bad}")));
@@ -51,7 +56,10 @@ impl Grid {
         }
         let (shape, values) = read_npy(&files::read(path)?).map_err(|e| e.in_file(path))?;
         let [nz, ny, nx] = shape[..] else {
-            return Err(Error::file(path, format!("has {} dimensions; a density grid has 3 ([z][y][x])", shape.len())));
+            return Err(Error::file(
+                path,
+                format!("has {} dimensions; a density grid has 3 ([z][y][x])", shape.len()),
+            ));
         };
         Self::new([nx, ny, nz], min, max, values).map_err(|e| e.in_file(path))
     }
@@ -95,7 +103,8 @@ impl Grid {
             let i = s as usize;
             *c = (i, (i + 1).min(n - 1), s - i as f64);
         }
-        let at = |i: usize, j: usize, k: usize| f64::from(self.values[(k * self.size[1] + j) * self.size[0] + i]);
+        let at =
+            |i: usize, j: usize, k: usize| f64::from(self.values[(k * self.size[1] + j) * self.size[0] + i]);
         let [(x0, x1, fx), (y0, y1, fy), (z0, z1, fz)] = cell;
         let lerp = |a: f64, b: f64, f: f64| a + (b - a) * f;
         let plane = |z: usize| {
@@ -165,7 +174,9 @@ pub(crate) fn read_npy(bytes: &[u8]) -> Result<(Vec<usize>, Vec<f32>)> {
     };
     let data = bytes.len() - header_length(bytes).ok_or_else(|| bad("its header is cut".to_owned()))?;
     if count.and_then(|c| c.checked_mul(size)) != Some(data) {
-        return Err(bad(format!("its header promises {shape:?} values of {size} bytes but {data} bytes follow")));
+        return Err(bad(format!(
+            "its header promises {shape:?} values of {size} bytes but {data} bytes follow"
+        )));
     }
     let failed = |e: std::io::Error| bad(e.to_string());
     let values = match size {

@@ -34,10 +34,14 @@ impl Medium {
     /// Negative or non-finite extinction, albedo outside 0..1, |g| ≥ 1, `ior` below 1 or above 10.
     pub fn new(extinction: DVec3, albedo: DVec3, phase: Phase, ior: f64, density: Density) -> Result<Self> {
         if !extinction.is_finite() || extinction.min_element() < 0.0 {
-            return Err(Error::invalid(format!("extinction must be finite and not negative, not {extinction}")));
+            return Err(Error::invalid(format!(
+                "extinction must be finite and not negative, not {extinction}"
+            )));
         }
         if !albedo.is_finite() || albedo.min_element() < 0.0 || albedo.max_element() > 1.0 {
-            return Err(Error::invalid(format!("albedo must lie within 0..1 in every channel, not {albedo}")));
+            return Err(Error::invalid(format!(
+                "albedo must lie within 0..1 in every channel, not {albedo}"
+            )));
         }
         let g = phase.mean_cosine();
         if !(g.abs() < 1.0) {

@@ -64,7 +64,8 @@ impl SampledDensity {
 
     /// P for one direction (unit vector).
     pub fn running(&self, direction: DVec3) -> RunningIntegral {
-        let along = (0..3).fold(0, |best, k| if direction[k].abs() > direction[best].abs() { k } else { best });
+        let along =
+            (0..3).fold(0, |best, k| if direction[k].abs() > direction[best].abs() { k } else { best });
         let (b, c) = ((along + 1) % 3, (along + 2) % 3);
         let slope = [direction[b] / direction[along], direction[c] / direction[along]];
         let n = self.size[along];
@@ -135,7 +136,10 @@ impl RunningIntegral {
         let p = (x - self.min) * self.inverse;
         let [along, b, c] = self.axes;
         let s = p[along].clamp(0.0, self.slices as f64);
-        let q = [p[b] - self.slope[0] * p[along] - self.lowest[0], p[c] - self.slope[1] * p[along] - self.lowest[1]];
+        let q = [
+            p[b] - self.slope[0] * p[along] - self.lowest[0],
+            p[c] - self.slope[1] * p[along] - self.lowest[1],
+        ];
         let (u0, u1, fu) = neighbours(q[0], self.across[0]);
         let (v0, v1, fv) = neighbours(q[1], self.across[1]);
         let k = (s as usize).min(self.slices - 1);
@@ -165,7 +169,8 @@ mod tests {
         let noise = Noise { seed: 4, frequency: 1.0, octaves: 2, range: [0.3, 1.5] };
         let medium =
             Medium::new(DVec3::ONE, DVec3::ZERO, Phase::Isotropic, 1.0, Density::Noise(noise)).unwrap();
-        let sampled = SampledDensity::new(&medium, DVec3::new(-1.0, -0.6, -0.8), DVec3::new(1.0, 0.7, 0.9), 96);
+        let sampled =
+            SampledDensity::new(&medium, DVec3::new(-1.0, -0.6, -0.8), DVec3::new(1.0, 0.7, 0.9), 96);
         for direction in crate::directions::even_directions(32, 5) {
             let running = sampled.running(direction);
             let origin = DVec3::new(0.1, -0.05, 0.02);

@@ -40,7 +40,9 @@ impl std::fmt::Debug for Solid {
         match self {
             Self::Sphere { center, radius } => write!(f, "Sphere({center}, {radius})"),
             Self::Box { min, max } => write!(f, "Box({min}, {max})"),
-            Self::Torus { center, axis, radius, tube } => write!(f, "Torus({center}, {axis}, {radius}, {tube})"),
+            Self::Torus { center, axis, radius, tube } => {
+                write!(f, "Torus({center}, {axis}, {radius}, {tube})")
+            }
             Self::Mesh(m) => write!(f, "Mesh({} triangles)", m.0.triangles.len()),
         }
     }
@@ -125,7 +127,10 @@ impl Solid {
             Self::Box { min, max } => {
                 for k in 0..3 {
                     if direction[k] != 0.0 {
-                        out.extend([(min[k] - origin[k]) / direction[k], (max[k] - origin[k]) / direction[k]]);
+                        out.extend([
+                            (min[k] - origin[k]) / direction[k],
+                            (max[k] - origin[k]) / direction[k],
+                        ]);
                     }
                 }
             }

@@ -37,8 +37,11 @@ pub fn parse_obj(bytes: &[u8]) -> Result<(Mesh, MeshReport)> {
         objects += 1;
         ignored_attributes |=
             !mesh.texcoords.is_empty() || !mesh.normals.is_empty() || mesh.material_id.is_some();
-        let base = u32::try_from(positions.len()).map_err(|_| Error::invalid("has more than 2^32 vertices"))?;
-        positions.extend(mesh.positions.chunks_exact(3).map(|p| DVec3::new(p[0].into(), p[1].into(), p[2].into())));
+        let base =
+            u32::try_from(positions.len()).map_err(|_| Error::invalid("has more than 2^32 vertices"))?;
+        positions.extend(
+            mesh.positions.chunks_exact(3).map(|p| DVec3::new(p[0].into(), p[1].into(), p[2].into())),
+        );
         for t in mesh.indices.chunks_exact(3) {
             triangles.push([t[0], t[1], t[2]].map(|i| i.saturating_add(base)));
         }

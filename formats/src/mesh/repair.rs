@@ -236,8 +236,9 @@ fn turn_components_outwards(mesh: &mut Mesh, component: &[u32], report: &mut Mes
         volume[c as usize] += (a - centre).dot((b - centre).cross(d - centre)) / 6.0;
         witness[c as usize] = a;
     }
-    let turn: Vec<bool> =
-        (0..count).map(|c| volume[c] < 0.0 && (count == 1 || !inside_another(mesh, &owners, c as u32, witness[c]))).collect();
+    let turn: Vec<bool> = (0..count)
+        .map(|c| volume[c] < 0.0 && (count == 1 || !inside_another(mesh, &owners, c as u32, witness[c])))
+        .collect();
     for (i, &c) in owners.iter().enumerate() {
         if turn[c as usize] {
             mesh.triangles[i].swap(1, 2);

@@ -47,7 +47,8 @@ impl MeshReport {
         say(self.flipped, "triangles were turned round to make the winding consistent");
         say(self.non_manifold_edges, "edges are shared by more than two triangles");
         if self.holes > 0 {
-            lines.push(format!("{} holes ({} open edges) were closed with fans", self.holes, self.open_edges));
+            lines
+                .push(format!("{} holes ({} open edges) were closed with fans", self.holes, self.open_edges));
         }
         if self.self_intersections > 0 {
             lines.push(format!(

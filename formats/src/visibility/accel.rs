@@ -74,7 +74,14 @@ impl Accel {
 
     /// All crossings of the ray `origin` + t · `direction` with t in `t_min..t_max`, unsorted, into `out` (cleared).
     /// The direction need not be a unit vector.
-    pub fn crossings(&self, origin: DVec3, direction: DVec3, t_min: f64, t_max: f64, out: &mut Vec<Crossing>) {
+    pub fn crossings(
+        &self,
+        origin: DVec3,
+        direction: DVec3,
+        t_min: f64,
+        t_max: f64,
+        out: &mut Vec<Crossing>,
+    ) {
         out.clear();
         if self.corners.is_empty() {
             return;
@@ -86,7 +93,7 @@ impl Accel {
         if unit == DVec3::ZERO {
             return;
         }
-        let shift = (start.length() > 4.0).then(|| -start.dot(unit) - 2.0).unwrap_or(0.0).max(0.0);
+        let shift = if start.length() > 4.0 { (-start.dot(unit) - 2.0).max(0.0) } else { 0.0 };
         start += unit * shift;
         let shear = Shear::new(unit);
         let ray = Ray::new(start.as_vec3a(), unit.as_vec3a() + Vec3A::ZERO, 0.0, f32::INFINITY);

@@ -50,7 +50,9 @@ impl Buckets {
         let extent = [(high[0] - low[0]).max(1e-300), (high[1] - low[1]).max(1e-300)];
         // About two points a cell, and never more cells along an axis than a square grid four times as fine.
         let target = (points.len() as f64 / 2.0).max(1.0);
-        let cell = (extent[0] * extent[1] / target).sqrt().max(extent[0].max(extent[1]) / (2.0 * target.sqrt()).ceil());
+        let cell = (extent[0] * extent[1] / target)
+            .sqrt()
+            .max(extent[0].max(extent[1]) / (2.0 * target.sqrt()).ceil());
         let inverse_cell = 1.0 / cell;
         let size = extent.map(|e| (e * inverse_cell) as usize + 1);
         let cell_of = |p: &[f64; 3]| {
@@ -189,7 +191,8 @@ pub fn project_with(
                     sign * (running.at(points[i] + direction * distance) - at_point[i])
                 } else {
                     let origin = points[buckets.order[k] as usize];
-                    let (along, length) = if side == 0 { (direction, distance) } else { (-direction, -distance) };
+                    let (along, length) =
+                        if side == 0 { (direction, distance) } else { (-direction, -distance) };
                     let signed = if side == 0 { sign } else { -sign };
                     signed * medium.density_length(origin, along, 0.0, length)
                 };

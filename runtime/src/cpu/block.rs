@@ -63,10 +63,7 @@ impl Shared<'_> {
         let mut block = Block {
             rect,
             pixels: vec![(Vec3::ZERO, 0.0); pixels],
-            counters: Counters {
-                rays: (pixels * self.offsets.len()) as u64,
-                ..Counters::default()
-            },
+            counters: Counters { rays: (pixels * self.offsets.len()) as u64, ..Counters::default() },
             seconds: [0.0; 3],
         };
         let per_pixel = 1.0 / self.offsets.len() as f32;
@@ -99,10 +96,7 @@ impl Shared<'_> {
             block.seconds[2] += started.elapsed().as_secs_f64();
         }
         // Sums of reciprocals may miss 1 by rounding.
-        block
-            .pixels
-            .iter_mut()
-            .for_each(|(_, c)| *c = if *c > 1.0 - 1e-4 { 1.0 } else { *c });
+        block.pixels.iter_mut().for_each(|(_, c)| *c = if *c > 1.0 - 1e-4 { 1.0 } else { *c });
         block
     }
 
@@ -139,23 +133,12 @@ impl Shared<'_> {
                 let pixel = (y - block.low[1]) as usize * block.width() + (x - block.low[0]) as usize;
                 for [dx, dy] in self.offsets {
                     let direction =
-                        frame
-                            .view
-                            .direction(x as f32 + dx, y as f32 + dy, frame.width, frame.height);
+                        frame.view.direction(x as f32 + dx, y as f32 + dy, frame.width, frame.height);
                     let origin = frame.view.origin;
-                    let segments = segments::trace(
-                        &renderer.accel,
-                        renderer.ior,
-                        origin,
-                        direction,
-                        &mut work.scratch,
-                    );
+                    let segments =
+                        segments::trace(&renderer.accel, renderer.ior, origin, direction, &mut work.scratch);
                     if segments.count > 0 {
-                        work.rays.push(TileRay {
-                            pixel,
-                            direction,
-                            segments,
-                        });
+                        work.rays.push(TileRay { pixel, direction, segments });
                     }
                 }
             }
@@ -170,10 +153,7 @@ impl Shared<'_> {
         let renderer = self.renderer;
         tiles::select(&work.block, self.frame, tile, &mut work.tile);
         work.candidates.fill(&work.tile, &renderer.cloud);
-        let medium = RayMedium {
-            extinction: renderer.extinction,
-            density: renderer.density.as_ref(),
-        };
+        let medium = RayMedium { extinction: renderer.extinction, density: renderer.density.as_ref() };
         for ray in &work.rays {
             work.candidates.along(ray.direction, self.sources, &mut work.hits);
             let origin = self.frame.view.origin;

@@ -77,19 +77,13 @@ impl Lighting {
         samples: &Samples,
         exact: Option<&'a ExactDepths>,
     ) -> Prepared<'a> {
-        let table = exact
-            .and_then(|e| e.light(index))
-            .filter(|t| t.len() == samples.len());
+        let table = exact.and_then(|e| e.light(index)).filter(|t| t.len() == samples.len());
         let basis = (light.kind == LightKind::Directional).then(|| {
             let mut basis = vec![0.0; self.order * self.order];
             sh::evaluate_f32(self.order, (-light.direction).to_array(), &mut basis);
             basis
         });
-        Prepared {
-            light,
-            basis,
-            exact: table,
-        }
+        Prepared { light, basis, exact: table }
     }
 
     fn source(&self, samples: &Samples, i: usize, frame: &Frame, lights: &[Prepared]) -> Vec3 {
@@ -136,11 +130,7 @@ impl Lighting {
         if tau == f32::INFINITY || through == 0.0 {
             return Vec3::ZERO;
         }
-        if ratio == Vec3::ONE {
-            Vec3::splat((-tau).exp() * through)
-        } else {
-            (-ratio * tau).exp() * through
-        }
+        if ratio == Vec3::ONE { Vec3::splat((-tau).exp() * through) } else { (-ratio * tau).exp() * through }
     }
 }
 

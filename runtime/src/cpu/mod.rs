@@ -62,9 +62,7 @@ impl CpuRenderer {
             density: asset.density.clone(),
             extinction: extinction.min(DVec3::splat(MOST_EXTINCTION)).as_vec3(),
             ior: medium.ior(),
-            corners: (0..mesh.triangles.len())
-                .map(|i| mesh.corners(i).map(|p| p.as_vec3()))
-                .collect(),
+            corners: (0..mesh.triangles.len()).map(|i| mesh.corners(i).map(|p| p.as_vec3())).collect(),
             normals: surface::corner_normals(&mesh),
             samples_drawn: samples.weight.iter().filter(|w| **w > 0.0).count() as u64,
             samples,
@@ -84,37 +82,21 @@ impl CpuRenderer {
         let started = Instant::now();
         let offsets = subpixel_offsets(frame.samples_per_pixel as usize);
         let kernels = tiles::kernels(&self.cloud, frame.view.origin);
-        let shared = Shared {
-            renderer: self,
-            frame,
-            sources: &sources,
-            kernels: &kernels,
-            offsets: &offsets,
-        };
+        let shared =
+            Shared { renderer: self, frame, sources: &sources, kernels: &kernels, offsets: &offsets };
         let rects = Rect::all(frame).split(BLOCK);
-        let blocks: Vec<Block> = rects
-            .into_par_iter()
-            .with_max_len(1)
-            .map(|rect| shared.draw(rect))
-            .collect();
+        let blocks: Vec<Block> =
+            rects.into_par_iter().with_max_len(1).map(|rect| shared.draw(rect)).collect();
         let wall = milliseconds(started);
         let mut picture = Picture::new(frame.width as usize, frame.height as usize);
         let mut coverage = vec![0.0; picture.pixels.len()];
-        let mut counters = Counters {
-            samples_drawn: self.samples_drawn,
-            ..Counters::default()
-        };
+        let mut counters = Counters { samples_drawn: self.samples_drawn, ..Counters::default() };
         let mut seconds = [0.0; 3];
         for block in blocks {
-            scatter(
-                block.rect,
-                picture.width,
-                &block.pixels,
-                |to, (radiance, covered)| {
-                    picture.pixels[to] = radiance.to_array();
-                    coverage[to] = covered;
-                },
-            );
+            scatter(block.rect, picture.width, &block.pixels, |to, (radiance, covered)| {
+                picture.pixels[to] = radiance.to_array();
+                coverage[to] = covered;
+            });
             counters = counters.merge(block.counters);
             (0..3).for_each(|k| seconds[k] += block.seconds[k]);
         }
@@ -128,29 +110,16 @@ impl CpuRenderer {
             ("splat", share(1)),
             ("surface", share(2)),
         ];
-        Rendered {
-            picture,
-            counters,
-            passes,
-        }
+        Rendered { picture, counters, passes }
     }
 
     /// What one ray of every pixel sees, at `offset` inside the pixel (0..1): rows one after the other.
     pub fn trace_rays(&self, frame: &Frame, sources: &[Source], offset: [f32; 2]) -> Vec<RayResult> {
         let kernels = tiles::kernels(&self.cloud, frame.view.origin);
-        let shared = Shared {
-            renderer: self,
-            frame,
-            sources,
-            kernels: &kernels,
-            offsets: &[offset],
-        };
+        let shared = Shared { renderer: self, frame, sources, kernels: &kernels, offsets: &[offset] };
         let rects = Rect::all(frame).split(BLOCK);
-        let blocks: Vec<(Rect, Vec<RayResult>)> = rects
-            .into_par_iter()
-            .with_max_len(1)
-            .map(|rect| (rect, shared.rays(rect)))
-            .collect();
+        let blocks: Vec<(Rect, Vec<RayResult>)> =
+            rects.into_par_iter().with_max_len(1).map(|rect| (rect, shared.rays(rect))).collect();
         let width = frame.width as usize;
         let mut results = vec![RayResult::default(); width * frame.height as usize];
         for (rect, rays) in blocks {
@@ -162,11 +131,7 @@ impl CpuRenderer {
     /// The surface where a ray enters `triangle` at distance `t`.
     fn entry(&self, frame: &Frame, triangle: u32, direction: Vec3, t: f32) -> surface::Entry {
         let triangle = triangle as usize;
-        surface::Entry::new(
-            frame.view.origin + direction * t,
-            self.corners[triangle],
-            self.normals[triangle],
-        )
+        surface::Entry::new(frame.view.origin + direction * t, self.corners[triangle], self.normals[triangle])
     }
 }
 

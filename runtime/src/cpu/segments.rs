@@ -46,23 +46,13 @@ pub struct Scratch {
 /// equal ends and emit nothing.
 pub fn trace(accel: &Accel, ior: f64, origin: Vec3, direction: Vec3, scratch: &mut Scratch) -> Segments {
     let Scratch { crossings, pieces } = scratch;
-    inside_pieces(
-        accel,
-        ior,
-        origin.as_dvec3(),
-        direction.as_dvec3(),
-        crossings,
-        pieces,
-    );
+    inside_pieces(accel, ior, origin.as_dvec3(), direction.as_dvec3(), crossings, pieces);
     let mut segments = Segments::default();
     let mut passed = 1.0;
     for piece in pieces.iter().take(MAX_PIECES) {
         let inside = passed * piece.boundary[0];
-        segments.pieces[segments.count] = Piece {
-            start: piece.start as f32,
-            end: piece.end as f32,
-            boundary: inside as f32,
-        };
+        segments.pieces[segments.count] =
+            Piece { start: piece.start as f32, end: piece.end as f32, boundary: inside as f32 };
         segments.count += 1;
         passed = inside * piece.boundary[1];
     }

@@ -31,9 +31,8 @@ pub const CREASE_COSINE: f64 = 0.7;
 /// Unit normals of the three corners of every triangle (zero for a triangle without area).
 pub fn corner_normals(mesh: &Mesh) -> Vec<[Vec3; 3]> {
     let mut sums = vec![DVec3::ZERO; mesh.positions.len()];
-    let faces: Vec<DVec3> = (0..mesh.triangles.len())
-        .map(|i| mesh.area_normal(i).normalize_or_zero())
-        .collect();
+    let faces: Vec<DVec3> =
+        (0..mesh.triangles.len()).map(|i| mesh.area_normal(i).normalize_or_zero()).collect();
     for (i, t) in mesh.triangles.iter().enumerate() {
         let p = mesh.corners(i);
         for k in 0..3 {
@@ -43,17 +42,9 @@ pub fn corner_normals(mesh: &Mesh) -> Vec<[Vec3; 3]> {
     }
     let corner = |v: u32, face: DVec3| {
         let smooth = sums[v as usize].normalize_or_zero();
-        if smooth.dot(face) > CREASE_COSINE {
-            smooth.as_vec3()
-        } else {
-            face.as_vec3()
-        }
+        if smooth.dot(face) > CREASE_COSINE { smooth.as_vec3() } else { face.as_vec3() }
     };
-    mesh.triangles
-        .iter()
-        .zip(&faces)
-        .map(|(t, &face)| t.map(|v| corner(v, face)))
-        .collect()
+    mesh.triangles.iter().zip(&faces).map(|(t, &face)| t.map(|v| corner(v, face))).collect()
 }
 
 /// Where a ray enters the object.
@@ -76,11 +67,7 @@ impl Entry {
         let u = (c - b).cross(point - b).dot(area) * inverse;
         let v = (a - c).cross(point - c).dot(area) * inverse;
         let smooth = normals[0] * u + normals[1] * v + normals[2] * (1.0 - u - v);
-        Self {
-            point,
-            smooth: smooth.normalize_or_zero(),
-            geometric: area.normalize_or_zero(),
-        }
+        Self { point, smooth: smooth.normalize_or_zero(), geometric: area.normalize_or_zero() }
     }
 }
 
@@ -92,11 +79,7 @@ pub fn is_drawn(frame: &Frame, ior: f64) -> bool {
 /// Radiance that the entry reflects towards the camera; `direction` is the camera ray's unit direction.
 pub fn highlight(frame: &Frame, ior: f64, entry: &Entry, direction: Vec3) -> Vec3 {
     let towards_camera = -direction;
-    let n = if entry.smooth.dot(towards_camera) > 0.0 {
-        entry.smooth
-    } else {
-        entry.geometric
-    };
+    let n = if entry.smooth.dot(towards_camera) > 0.0 { entry.smooth } else { entry.geometric };
     let alpha = (frame.surface.roughness as f32).max(LEAST_ROUGHNESS).powi(2);
     let mut sum = Vec3::ZERO;
     for light in &frame.lights[..frame.scene_lights] {
@@ -113,9 +96,5 @@ pub fn highlight(frame: &Frame, ior: f64, entry: &Entry, direction: Vec3) -> Vec
         sum += irradiance * (cosine * fresnel * lobe / (4.0 * (lh * lh).max(0.01)));
     }
     let highlight = sum * frame.surface.specular as f32;
-    if highlight.is_finite() {
-        highlight
-    } else {
-        Vec3::ZERO
-    }
+    if highlight.is_finite() { highlight } else { Vec3::ZERO }
 }

@@ -37,10 +37,7 @@ pub struct Rect {
 impl Rect {
     /// The whole picture.
     pub fn all(frame: &Frame) -> Self {
-        Self {
-            low: [0, 0],
-            high: [frame.width, frame.height],
-        }
+        Self { low: [0, 0], high: [frame.width, frame.height] }
     }
 
     /// Squares of `side` pixels that cover this rectangle, row by row; those at the end may be narrower.
@@ -48,12 +45,7 @@ impl Rect {
         let starts = |k: usize| (self.low[k]..self.high[k]).step_by(side as usize);
         let end = |k: usize, start: u32| start.saturating_add(side).min(self.high[k]);
         starts(1)
-            .flat_map(|y| {
-                starts(0).map(move |x| Self {
-                    low: [x, y],
-                    high: [end(0, x), end(1, y)],
-                })
-            })
+            .flat_map(|y| starts(0).map(move |x| Self { low: [x, y], high: [end(0, x), end(1, y)] }))
             .collect()
     }
 
@@ -80,11 +72,7 @@ impl Cone {
         let cosine = corners.iter().map(|c| c.dot(axis)).fold(1.0, f32::min);
         // Widened by more than the rounding of directions.
         let cosine = cosine - 1e-6;
-        Self {
-            axis,
-            cosine,
-            sine: (1.0 - cosine * cosine).max(0.0).sqrt(),
-        }
+        Self { axis, cosine, sine: (1.0 - cosine * cosine).max(0.0).sqrt() }
     }
 
     fn may_meet(&self, centre: Vec3, radius: f32) -> bool {
@@ -111,16 +99,9 @@ pub fn kernels(cloud: &Cloud, camera: Vec3) -> Vec<Kernel> {
     let kernel = |i: usize| {
         let centre = cloud.centre[i] - camera;
         let radius = CUT_OFF_RADIUS / cloud.sharpness[i] * 1.001 + centre.length() * 1e-6;
-        Kernel {
-            centre,
-            radius,
-            index: i as u32,
-        }
+        Kernel { centre, radius, index: i as u32 }
     };
-    (0..cloud.centre.len())
-        .filter(|&i| cloud.weight[i] > 0.0)
-        .map(kernel)
-        .collect()
+    (0..cloud.centre.len()).filter(|&i| cloud.weight[i] > 0.0).map(kernel).collect()
 }
 
 /// Those of `kernels` that rays of `rect` may meet, into `out` (cleared).

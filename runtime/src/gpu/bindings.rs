@@ -26,11 +26,8 @@ pub(super) enum Slot {
 
 impl Slot {
     fn binding_type(self) -> BindingType {
-        let buffer = |ty, has_dynamic_offset| BindingType::Buffer {
-            ty,
-            has_dynamic_offset,
-            min_binding_size: None,
-        };
+        let buffer =
+            |ty, has_dynamic_offset| BindingType::Buffer { ty, has_dynamic_offset, min_binding_size: None };
         match self {
             Self::Uniform => buffer(BufferBindingType::Uniform, false),
             Self::Moving => buffer(BufferBindingType::Uniform, true),
@@ -53,19 +50,12 @@ pub(super) fn layout(device: &Device, label: &str, stages: ShaderStages, slots: 
         .enumerate()
         .map(|(i, slot)| BindGroupLayoutEntry {
             binding: i as u32,
-            visibility: if matches!(slot, Slot::Write) {
-                stages & !ShaderStages::VERTEX
-            } else {
-                stages
-            },
+            visibility: if matches!(slot, Slot::Write) { stages & !ShaderStages::VERTEX } else { stages },
             ty: slot.binding_type(),
             count: None,
         })
         .collect();
-    device.create_bind_group_layout(&BindGroupLayoutDescriptor {
-        label: Some(label),
-        entries: &entries,
-    })
+    device.create_bind_group_layout(&BindGroupLayoutDescriptor { label: Some(label), entries: &entries })
 }
 
 /// A group with `resources` at bindings 0, 1, ...
@@ -78,16 +68,9 @@ pub(super) fn group(
     let entries: Vec<BindGroupEntry> = resources
         .into_iter()
         .enumerate()
-        .map(|(i, resource)| BindGroupEntry {
-            binding: i as u32,
-            resource,
-        })
+        .map(|(i, resource)| BindGroupEntry { binding: i as u32, resource })
         .collect();
-    device.create_bind_group(&BindGroupDescriptor {
-        label: Some(label),
-        layout,
-        entries: &entries,
-    })
+    device.create_bind_group(&BindGroupDescriptor { label: Some(label), layout, entries: &entries })
 }
 
 /// The layout of a pass: the common group and its own.
@@ -106,10 +89,7 @@ pub(super) fn pipeline_layout(
 
 /// Constants of a pipeline as overrides of the shader.
 pub(super) fn options<'a>(constants: &'a [(&'a str, f64)]) -> PipelineCompilationOptions<'a> {
-    PipelineCompilationOptions {
-        constants,
-        ..Default::default()
-    }
+    PipelineCompilationOptions { constants, ..Default::default() }
 }
 
 /// A compute pipeline.
@@ -148,14 +128,6 @@ pub(super) fn filled_buffer<T: bytemuck::Pod>(
     usage: BufferUsages,
 ) -> Buffer {
     let bytes: &[u8] = bytemuck::cast_slice(data);
-    let contents = if bytes.len() < 16 {
-        &[bytes, &[0; 16]].concat()
-    } else {
-        bytes
-    };
-    device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-        label: Some(label),
-        contents,
-        usage,
-    })
+    let contents = if bytes.len() < 16 { &[bytes, &[0; 16]].concat() } else { bytes };
+    device.create_buffer_init(&wgpu::util::BufferInitDescriptor { label: Some(label), contents, usage })
 }

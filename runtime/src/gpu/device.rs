@@ -25,10 +25,7 @@ struct Faults(Arc<Mutex<Option<String>>>);
 impl Faults {
     fn report(&self, message: String) {
         log::debug!("{message}");
-        self.0
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner)
-            .get_or_insert(message);
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(message);
     }
 
     fn take(&self) -> Option<String> {
@@ -58,9 +55,7 @@ impl GpuDevice {
     pub fn open(instance: &Instance, surface: Option<&Surface<'_>>) -> Result<Self> {
         let mut adapters = pollster::block_on(instance.enumerate_adapters(Backends::all()));
         if adapters.is_empty() {
-            return Err(Error::NoAdapter(
-                "no Vulkan, Metal or DirectX 12 driver was found".to_owned(),
-            ));
+            return Err(Error::NoAdapter("no Vulkan, Metal or DirectX 12 driver was found".to_owned()));
         }
         adapters.sort_by_key(|a| rank(a.get_info().device_type));
         let mut refused = Vec::new();
@@ -92,12 +87,7 @@ impl GpuDevice {
                 report.report(format!("the device was lost: {}", first_line(&message)));
             }
         });
-        Ok(Self {
-            device,
-            queue,
-            adapter,
-            faults,
-        })
+        Ok(Self { device, queue, adapter, faults })
     }
 
     /// The adapter's name, its backend, and whether it is software.
@@ -117,20 +107,13 @@ impl GpuDevice {
     /// # Errors
     /// What the driver said, or that the device was lost.
     pub fn check(&self) -> Result<()> {
-        self.faults
-            .take()
-            .map_or(Ok(()), |message| Err(Error::Gpu(message)))
+        self.faults.take().map_or(Ok(()), |message| Err(Error::Gpu(message)))
     }
 }
 
 /// Errors of wgpu explain themselves over many lines; one is enough for a user, the log has the rest.
 fn first_line(message: &str) -> String {
-    message
-        .lines()
-        .map(str::trim)
-        .filter(|l| !l.is_empty())
-        .collect::<Vec<_>>()
-        .join("; ")
+    message.lines().map(str::trim).filter(|l| !l.is_empty()).collect::<Vec<_>>().join("; ")
 }
 
 fn rank(kind: DeviceType) -> u32 {

@@ -36,13 +36,7 @@ impl GpuRenderer {
         owned.check()?;
         let timers = Timers::new(&owned.device, &owned.queue, 1);
         let name = owned.describe();
-        Ok(Self {
-            owned,
-            renderer,
-            timers,
-            name,
-            tiles: 0,
-        })
+        Ok(Self { owned, renderer, timers, name, tiles: 0 })
     }
 
     /// The adapter's name, backend, and whether it is software.
@@ -87,11 +81,7 @@ impl GpuRenderer {
         if passes.is_empty() {
             passes.push(("frame", started.elapsed().as_secs_f64() * 1e3));
         }
-        Ok(Rendered {
-            picture,
-            counters,
-            passes,
-        })
+        Ok(Rendered { picture, counters, passes })
     }
 
     /// What one ray of every pixel sees, at `offset` inside the pixel (0..1), without highlights: rows one after the
@@ -144,8 +134,7 @@ impl GpuRenderer {
         }
         let mut milliseconds = [0.0; PASSES];
         for (t, &tile) in tiles.iter().enumerate() {
-            self.renderer
-                .write_views(device, queue, frame, &[tile], offsets, 0);
+            self.renderer.write_views(device, queue, frame, &[tile], offsets, 0);
             self.timers.restart();
             // One submission for each ray keeps every one short, whatever the adapter's patience.
             let submit = |timers: &mut Timers, record: &dyn Fn(&mut CommandEncoder, &mut Timers)| {
@@ -161,9 +150,7 @@ impl GpuRenderer {
                 }
             });
             for view in 0..offsets.len() {
-                submit(&mut self.timers, &|e, timers| {
-                    self.renderer.record_ray(e, timers, view, tile)
-                });
+                submit(&mut self.timers, &|e, timers| self.renderer.record_ray(e, timers, view, tile));
             }
             self.read(tile, &mut milliseconds, &mut take)?;
         }
@@ -178,10 +165,7 @@ impl GpuRenderer {
         milliseconds: &mut [f64; PASSES],
         take: &mut impl FnMut(Tile, TileData),
     ) -> Result<()> {
-        let targets = self
-            .renderer
-            .targets()
-            .ok_or_else(|| Error::Gpu("nothing was drawn".to_owned()))?;
+        let targets = self.renderer.targets().ok_or_else(|| Error::Gpu("nothing was drawn".to_owned()))?;
         let size = 16 * tile.pixels();
         let mut sources: Vec<(&Buffer, u64)> = vec![
             (&targets.radiance, size),

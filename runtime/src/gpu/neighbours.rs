@@ -13,11 +13,7 @@ pub(super) fn neighbours(triangles: &[[u32; 3]]) -> Vec<[u32; 3]> {
     }
     let across =
         |i: usize, t: &[u32; 3], k: usize| *owner.get(&(t[(k + 1) % 3], t[k])).unwrap_or(&(i as u32));
-    triangles
-        .iter()
-        .enumerate()
-        .map(|(i, t)| [0, 1, 2].map(|k| across(i, t, k)))
-        .collect()
+    triangles.iter().enumerate().map(|(i, t)| [0, 1, 2].map(|k| across(i, t, k))).collect()
 }
 
 #[cfg(test)]
@@ -27,10 +23,7 @@ mod tests {
     #[test]
     fn tetrahedron_and_open_edge() {
         let triangles = [[0, 1, 2], [0, 3, 1], [1, 3, 2], [2, 3, 0]];
-        assert_eq!(
-            neighbours(&triangles),
-            [[1, 2, 3], [3, 2, 0], [1, 3, 0], [2, 1, 0]]
-        );
+        assert_eq!(neighbours(&triangles), [[1, 2, 3], [3, 2, 0], [1, 3, 0], [2, 1, 0]]);
         assert_eq!(neighbours(&triangles[..2]), [[1, 0, 0], [1, 1, 0]]);
     }
 }

@@ -85,14 +85,10 @@ impl Pipeline {
         frame: &Frame,
         exact: Option<&ExactDepths>,
     ) -> Result<Vec<Tile>> {
-        self.frame
-            .write_lights(device, queue, &self.asset, frame, exact)?;
+        self.frame.write_lights(device, queue, &self.asset, frame, exact)?;
         let tiles = split(frame.width, frame.height, budget(device, &self.asset))?;
         // The first tile is the largest; `split` returns at least one.
-        let fits = self
-            .targets
-            .as_ref()
-            .is_some_and(|(t, _)| t.size == tiles[0].size);
+        let fits = self.targets.as_ref().is_some_and(|(t, _)| t.size == tiles[0].size);
         if !fits || self.frame.take_changed() {
             let old = self.targets.take().map(|(t, _)| t).filter(|_| fits);
             let targets = old.unwrap_or_else(|| Targets::new(device, &self.asset, tiles[0]));
@@ -118,8 +114,7 @@ impl Pipeline {
             let view = |(&offset, rays)| ViewUniform::new(frame, self.asset.diagonal, tile, offset, rays);
             views.extend(offsets.iter().zip(before + 1..).map(view));
         }
-        self.frame
-            .write_views(device, queue, &self.common, &self.asset, &views);
+        self.frame.write_views(device, queue, &self.common, &self.asset, &views);
     }
 
     /// The layout of the group that all passes share.
@@ -136,13 +131,7 @@ impl Pipeline {
         tile: Tile,
     ) -> Recorder<'a> {
         let view_offset = (view as u64 * VIEW_STRIDE) as u32;
-        Recorder {
-            encoder,
-            timers,
-            common: self.frame.common(),
-            view_offset,
-            tile: tile.size,
-        }
+        Recorder { encoder, timers, common: self.frame.common(), view_offset, tile: tile.size }
     }
 
     /// The targets of the frame that was begun.
@@ -154,13 +143,8 @@ impl Pipeline {
     pub(super) fn record_lighting(&self, encoder: &mut CommandEncoder, timers: &mut Timers) {
         let Some((_, groups)) = &self.targets else { return };
         if self.asset.sample_count > 0 {
-            let mut r = Recorder {
-                encoder,
-                timers,
-                common: self.frame.common(),
-                view_offset: 0,
-                tile: [0; 2],
-            };
+            let mut r =
+                Recorder { encoder, timers, common: self.frame.common(), view_offset: 0, tile: [0; 2] };
             self.lighting.record(&mut r, &groups.lighting, &self.asset);
             self.slopes.record(&mut r, &groups.slopes, &self.asset);
         }
@@ -210,10 +194,7 @@ impl Pipeline {
             lighting: self.lighting.bind(device, asset, frame),
             slopes: self.slopes.bind(device, asset),
             surface: self.surface.bind(device, asset, targets),
-            boundary: self
-                .boundary
-                .as_ref()
-                .map(|b| b.bind(device, asset, frame, targets)),
+            boundary: self.boundary.as_ref().map(|b| b.bind(device, asset, frame, targets)),
             segments: self.segments.bind(device, targets),
             pieces: (0..MAX_PIECES).map(piece).collect(),
         }

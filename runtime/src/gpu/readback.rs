@@ -16,10 +16,8 @@ const MAPPABLE: BufferUsages = BufferUsages::MAP_READ.union(BufferUsages::COPY_D
 /// The device failed.
 pub(super) fn buffers(device: &Device, queue: &Queue, sources: &[(&Buffer, u64)]) -> Result<Vec<Buffer>> {
     let mut encoder = device.create_command_encoder(&Default::default());
-    let copies: Vec<Buffer> = sources
-        .iter()
-        .map(|(source, size)| copy(device, &mut encoder, source, *size))
-        .collect();
+    let copies: Vec<Buffer> =
+        sources.iter().map(|(source, size)| copy(device, &mut encoder, source, *size)).collect();
     queue.submit([encoder.finish()]);
     map(device, &copies)?;
     Ok(copies)
@@ -40,35 +38,21 @@ pub fn texture(device: &Device, queue: &Queue, texture: &Texture) -> Result<Vec<
     let texel = texture.format().block_copy_size(None).unwrap_or(4);
     let row = texel * texture.width();
     let padded = row.next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
-    let buffer = empty_buffer(
-        device,
-        "copy",
-        u64::from(padded) * u64::from(texture.height()),
-        MAPPABLE,
-    );
+    let buffer = empty_buffer(device, "copy", u64::from(padded) * u64::from(texture.height()), MAPPABLE);
     let mut encoder = device.create_command_encoder(&Default::default());
     encoder.copy_texture_to_buffer(
         texture.as_image_copy(),
         TexelCopyBufferInfo {
             buffer: &buffer,
-            layout: TexelCopyBufferLayout {
-                offset: 0,
-                bytes_per_row: Some(padded),
-                rows_per_image: None,
-            },
+            layout: TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(padded), rows_per_image: None },
         },
         texture.size(),
     );
     queue.submit([encoder.finish()]);
     map(device, std::slice::from_ref(&buffer))?;
-    let view = buffer
-        .get_mapped_range(..)
-        .map_err(|e| Error::Gpu(format!("cannot read a picture back: {e}")))?;
-    Ok(view
-        .chunks_exact(padded as usize)
-        .flat_map(|r| &r[..row as usize])
-        .copied()
-        .collect())
+    let view =
+        buffer.get_mapped_range(..).map_err(|e| Error::Gpu(format!("cannot read a picture back: {e}")))?;
+    Ok(view.chunks_exact(padded as usize).flat_map(|r| &r[..row as usize]).copied().collect())
 }
 
 /// Maps buffers for reading once everything submitted is done.
@@ -79,9 +63,7 @@ fn map(device: &Device, copies: &[Buffer]) -> Result<()> {
         // Nobody listens any more only when an earlier copy failed already.
         copy.map_async(MapMode::Read, .., move |result| drop(done.send(result)));
     }
-    device
-        .poll(PollType::wait_indefinitely())
-        .map_err(|e| Error::Gpu(e.to_string()))?;
+    device.poll(PollType::wait_indefinitely()).map_err(|e| Error::Gpu(e.to_string()))?;
     for _ in copies {
         let failed = || Error::Gpu("the device did not hand the picture back".to_owned());
         results.try_recv().map_err(|_| failed())?.map_err(|_| failed())?;

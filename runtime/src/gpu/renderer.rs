@@ -108,9 +108,7 @@ impl Renderer {
         let frame = request.frame;
         let side = device.limits().max_texture_dimension_2d;
         if frame.width.max(frame.height) > side {
-            return Err(Error::Gpu(format!(
-                "the picture is larger than the adapter's {side} pixels"
-            )));
+            return Err(Error::Gpu(format!("the picture is larger than the adapter's {side} pixels")));
         }
         let tiles = self.passes.begin(device, queue, frame, request.exact)?;
         self.tiles = tiles.len();
@@ -118,8 +116,7 @@ impl Renderer {
         let offsets = scattered_offsets(frame.samples_per_pixel);
         let offsets =
             &offsets[first as usize..(request.rays.end as usize).clamp(first as usize, offsets.len())];
-        self.passes
-            .write_views(device, queue, frame, &tiles, offsets, first);
+        self.passes.write_views(device, queue, frame, &tiles, offsets, first);
         self.timers.restart();
         self.display.write(queue, request.exposure);
         self.fit_picture(device, frame.width, frame.height);
@@ -146,11 +143,7 @@ impl Renderer {
         timers.close(encoder);
         if self.pending.is_none() && tiles.len() == 1 {
             let rays = u64::from(first) + offsets.len() as u64;
-            self.ask(
-                device,
-                encoder,
-                rays * u64::from(frame.width) * u64::from(frame.height),
-            );
+            self.ask(device, encoder, rays * u64::from(frame.width) * u64::from(frame.height));
         }
         Ok(())
     }
@@ -177,10 +170,7 @@ impl Renderer {
     /// # Errors
     /// The device failed, or nothing was drawn yet.
     pub fn read_picture(&self, device: &Device, queue: &Queue) -> Result<Picture> {
-        let shown = self
-            .picture
-            .as_ref()
-            .ok_or_else(|| Error::Gpu("nothing was drawn yet".to_owned()))?;
+        let shown = self.picture.as_ref().ok_or_else(|| Error::Gpu("nothing was drawn yet".to_owned()))?;
         let bytes = readback::texture(device, queue, &shown.texture)?;
         let texels: Vec<[f32; 4]> = bytes.chunks_exact(16).map(bytemuck::pod_read_unaligned).collect();
         let mut picture = Picture::new(shown.texture.width() as usize, shown.texture.height() as usize);
@@ -225,15 +215,10 @@ impl Renderer {
             return;
         };
         let samples_drawn = self.passes.asset.samples_drawn;
-        let mut counters = Counters {
-            rays: pending.rays,
-            samples_drawn,
-            ..Counters::default()
-        };
+        let mut counters = Counters { rays: pending.rays, samples_drawn, ..Counters::default() };
         if let Ok(view) = pending.counters.get_mapped_range(..) {
-            for [hit, dropped, splats, uncovered] in view
-                .chunks_exact(16)
-                .map(bytemuck::pod_read_unaligned::<[u32; 4]>)
+            for [hit, dropped, splats, uncovered] in
+                view.chunks_exact(16).map(bytemuck::pod_read_unaligned::<[u32; 4]>)
             {
                 counters.rays_hit += u64::from(hit);
                 counters.pieces_dropped += u64::from(dropped);
@@ -268,20 +253,12 @@ impl Renderer {
     }
 
     fn fit_picture(&mut self, device: &Device, width: u32, height: u32) {
-        if self
-            .picture
-            .as_ref()
-            .is_some_and(|s| s.texture.width() == width && s.texture.height() == height)
-        {
+        if self.picture.as_ref().is_some_and(|s| s.texture.width() == width && s.texture.height() == height) {
             return;
         }
         let texture = device.create_texture(&TextureDescriptor {
             label: Some("picture"),
-            size: Extent3d {
-                width,
-                height,
-                depth_or_array_layers: 1,
-            },
+            size: Extent3d { width, height, depth_or_array_layers: 1 },
             mip_level_count: 1,
             sample_count: 1,
             dimension: TextureDimension::D2,
@@ -308,9 +285,7 @@ fn scattered_offsets(count: u32) -> Vec<[f32; 2]> {
     };
     // Steps of about the golden section, without a common divisor, meet every position once.
     let n = offsets.len();
-    let step = (n * 382 / 1000..=n)
-        .find(|&s| s > 0 && gcd(s, n) == 1)
-        .unwrap_or(1);
+    let step = (n * 382 / 1000..=n).find(|&s| s > 0 && gcd(s, n) == 1).unwrap_or(1);
     (0..n).map(|i| offsets[(i + 1) * step % n]).collect()
 }
 

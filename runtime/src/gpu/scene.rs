@@ -70,15 +70,8 @@ impl AssetBuffers {
             .iter()
             .map(|s| s.gradient.extend(f32::from_bits(s.neighbour)).to_array())
             .collect();
-        let normals = if fresnel {
-            corner_normals(&asset.mesh()?)
-        } else {
-            Vec::new()
-        };
-        let recurrence: Vec<[f32; 4]> = sh::shader_table()
-            .iter()
-            .map(|&[a, b]| [a, b, 0.0, 0.0])
-            .collect();
+        let normals = if fresnel { corner_normals(&asset.mesh()?) } else { Vec::new() };
+        let recurrence: Vec<[f32; 4]> = sh::shader_table().iter().map(|&[a, b]| [a, b, 0.0, 0.0]).collect();
         let grid = asset.density.as_ref().map_or(&[][..], |g| &g.values);
         let medium = MediumUniform::new(asset);
         let limits = device.limits();
@@ -172,27 +165,13 @@ fn common_group(device: &Device, layout: &BindGroupLayout, views: &Buffer, mediu
 impl FrameBuffers {
     /// Small buffers to start with.
     pub fn new(device: &Device, common: &BindGroupLayout, asset: &AssetBuffers) -> Self {
-        let views = empty_buffer(
-            device,
-            "views",
-            VIEW_STRIDE,
-            BufferUsages::UNIFORM | BufferUsages::COPY_DST,
-        );
+        let views =
+            empty_buffer(device, "views", VIEW_STRIDE, BufferUsages::UNIFORM | BufferUsages::COPY_DST);
         Self {
             common: common_group(device, common, &views, &asset.medium),
             views,
-            lights: empty_buffer(
-                device,
-                "lights",
-                64,
-                BufferUsages::STORAGE | BufferUsages::COPY_DST,
-            ),
-            exact: empty_buffer(
-                device,
-                "exact",
-                16,
-                BufferUsages::STORAGE | BufferUsages::COPY_DST,
-            ),
+            lights: empty_buffer(device, "lights", 64, BufferUsages::STORAGE | BufferUsages::COPY_DST),
+            exact: empty_buffer(device, "exact", 16, BufferUsages::STORAGE | BufferUsages::COPY_DST),
             changed: true,
         }
     }
@@ -243,9 +222,7 @@ impl FrameBuffers {
         let mut tables: Vec<&[[f32; 2]]> = Vec::new();
         let mut records = Vec::with_capacity(frame.lights.len());
         for (i, light) in frame.lights.iter().enumerate() {
-            let table = exact
-                .and_then(|e| e.light(i))
-                .filter(|t| t.len() == asset.sample_count as usize);
+            let table = exact.and_then(|e| e.light(i)).filter(|t| t.len() == asset.sample_count as usize);
             let slot = table.map(|t| {
                 tables.push(t);
                 tables.len() as u32 - 1
@@ -264,12 +241,8 @@ impl FrameBuffers {
                 most >> 20
             )));
         }
-        self.changed |= grow(
-            device,
-            &mut self.lights,
-            "lights",
-            (records.len() * size_of::<LightRecord>()) as u64,
-        );
+        self.changed |=
+            grow(device, &mut self.lights, "lights", (records.len() * size_of::<LightRecord>()) as u64);
         self.changed |= grow(device, &mut self.exact, "exact", size);
         if !records.is_empty() {
             queue.write_buffer(&self.lights, 0, bytemuck::cast_slice(&records));
@@ -285,12 +258,7 @@ impl FrameBuffers {
 fn grow(device: &Device, buffer: &mut Buffer, label: &str, size: u64) -> bool {
     let small = buffer.size() < size;
     if small {
-        *buffer = empty_buffer(
-            device,
-            label,
-            size,
-            BufferUsages::STORAGE | BufferUsages::COPY_DST,
-        );
+        *buffer = empty_buffer(device, label, size, BufferUsages::STORAGE | BufferUsages::COPY_DST);
     }
     small
 }

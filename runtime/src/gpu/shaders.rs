@@ -7,39 +7,17 @@ macro_rules! source {
 }
 
 pub(super) const SURFACE: &str = source!("shared/view", "surface");
-pub(super) const BOUNDARY: &str = source!(
-    "shared/view",
-    "shared/medium",
-    "shared/light",
-    "shared/fresnel",
-    "surface",
-    "boundary"
-);
+pub(super) const BOUNDARY: &str =
+    source!("shared/view", "shared/medium", "shared/light", "shared/fresnel", "surface", "boundary");
 pub(super) const SEGMENTS: &str = source!("shared/view", "shared/medium", "segments");
 pub(super) const PROFILE: &str = source!("shared/view", "shared/medium", "shared/profile", "profile");
-pub(super) const LIGHTING: &str = source!(
-    "shared/view",
-    "shared/medium",
-    "shared/light",
-    "shared/phase",
-    "shared/sh",
-    "lighting"
-);
+pub(super) const LIGHTING: &str =
+    source!("shared/view", "shared/medium", "shared/light", "shared/phase", "shared/sh", "lighting");
 pub(super) const SLOPES: &str = source!("shared/view", "shared/medium", "slopes");
-pub(super) const SPLAT: &str = source!(
-    "shared/view",
-    "shared/medium",
-    "shared/kernel",
-    "shared/profile",
-    "splat"
-);
-pub(super) const RESOLVE: &str = source!(
-    "shared/view",
-    "shared/medium",
-    "shared/kernel",
-    "shared/profile",
-    "resolve"
-);
+pub(super) const SPLAT: &str =
+    source!("shared/view", "shared/medium", "shared/kernel", "shared/profile", "splat");
+pub(super) const RESOLVE: &str =
+    source!("shared/view", "shared/medium", "shared/kernel", "shared/profile", "resolve");
 
 pub(super) const PUBLISH: &str = source!("shared/view", "publish");
 pub(super) const DISPLAY: &str = source!("display");

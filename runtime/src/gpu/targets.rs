@@ -68,23 +68,15 @@ impl Targets {
     pub fn new(device: &Device, asset: &AssetBuffers, tile: Tile) -> Self {
         let pixels = tile.pixels();
         let stride = pixels.next_multiple_of(16);
-        let cell_stride = tile
-            .size
-            .iter()
-            .map(|n| u64::from(n.div_ceil(8)))
-            .product::<u64>()
-            .next_multiple_of(32);
+        let cell_stride =
+            tile.size.iter().map(|n| u64::from(n.div_ceil(8))).product::<u64>().next_multiple_of(32);
         let state = BufferUsages::STORAGE | BufferUsages::COPY_DST;
         let read = state | BufferUsages::COPY_SRC;
         let buffer = |label: &str, size: u64, usage| empty_buffer(device, label, size, usage);
         let texture = |label: &str, format| {
             let texture = device.create_texture(&TextureDescriptor {
                 label: Some(label),
-                size: Extent3d {
-                    width: tile.size[0],
-                    height: tile.size[1],
-                    depth_or_array_layers: 1,
-                },
+                size: Extent3d { width: tile.size[0], height: tile.size[1], depth_or_array_layers: 1 },
                 mip_level_count: 1,
                 sample_count: 1,
                 dimension: TextureDimension::D2,
@@ -98,25 +90,13 @@ impl Targets {
             size: tile.size,
             stride,
             crossings: buffer("crossings", CROSSINGS * pixels, state),
-            boundary: buffer(
-                "boundary",
-                if asset.fresnel { BOUNDARY * pixels } else { 0 },
-                state,
-            ),
+            boundary: buffer("boundary", if asset.fresnel { BOUNDARY * pixels } else { 0 }, state),
             pieces: buffer("pieces", PIECE * MAX_PIECES as u64 * stride, read),
             front: buffer("front", 16 * pixels, state),
             radiance: buffer("radiance", 16 * pixels, read),
             counters: buffer("counters", 16 * pixels, read),
-            profile: buffer(
-                "profile",
-                if asset.heterogeneous { PROFILE * stride } else { 0 },
-                state,
-            ),
-            arguments: buffer(
-                "arguments",
-                ARGUMENTS * MAX_PIECES as u64,
-                state | BufferUsages::INDIRECT,
-            ),
+            profile: buffer("profile", if asset.heterogeneous { PROFILE * stride } else { 0 }, state),
+            arguments: buffer("arguments", ARGUMENTS * MAX_PIECES as u64, state | BufferUsages::INDIRECT),
             cells: buffer("cells", CELL * MAX_PIECES as u64 * cell_stride, state),
             cell_stride,
             marker: texture("marker", MARKER_FORMAT),

@@ -44,18 +44,14 @@ pub(super) fn split(width: u32, height: u32, budget: Budget) -> Result<Vec<Tile>
     let most = most.saturating_sub(16);
     let columns = u64::from(width.min(budget.side)).min(most) as u32;
     if columns == 0 {
-        return Err(Error::Gpu(
-            "the adapter's buffers are too small for a single pixel".to_owned(),
-        ));
+        return Err(Error::Gpu("the adapter's buffers are too small for a single pixel".to_owned()));
     }
     let rows = u64::from(height.min(budget.side)).min(most / u64::from(columns)) as u32;
     let mut tiles = Vec::new();
     for top in (0..height).step_by(rows as usize) {
         for left in (0..width).step_by(columns as usize) {
-            tiles.push(Tile {
-                start: [left, top],
-                size: [columns.min(width - left), rows.min(height - top)],
-            });
+            tiles
+                .push(Tile { start: [left, top], size: [columns.min(width - left), rows.min(height - top)] });
         }
     }
     Ok(tiles)
@@ -65,32 +61,17 @@ pub(super) fn split(width: u32, height: u32, budget: Budget) -> Result<Vec<Tile>
 mod tests {
     use super::*;
 
-    const ROOMY: Budget = Budget {
-        side: 8192,
-        binding: 128 << 20,
-        total: 512 << 20,
-        pixel_binding: 64,
-        pixel_total: 248,
-    };
+    const ROOMY: Budget =
+        Budget { side: 8192, binding: 128 << 20, total: 512 << 20, pixel_binding: 64, pixel_total: 248 };
 
     #[test]
     fn small_pictures_are_one_tile() {
-        assert_eq!(
-            split(200, 100, ROOMY).unwrap(),
-            [Tile {
-                start: [0, 0],
-                size: [200, 100]
-            }]
-        );
+        assert_eq!(split(200, 100, ROOMY).unwrap(), [Tile { start: [0, 0], size: [200, 100] }]);
     }
 
     #[test]
     fn tiles_cover_every_pixel_once() {
-        let tight = Budget {
-            side: 7,
-            total: 248 * 45,
-            ..ROOMY
-        };
+        let tight = Budget { side: 7, total: 248 * 45, ..ROOMY };
         for (w, h) in [(1, 1), (7, 4), (8, 5), (23, 31)] {
             let tiles = split(w, h, tight).unwrap();
             let mut seen = vec![0; (w * h) as usize];

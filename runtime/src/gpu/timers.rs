@@ -37,10 +37,7 @@ impl Pass {
     /// Names and milliseconds of the passes that ran.
     pub fn named(milliseconds: &[f64; PASSES]) -> Vec<(&'static str, f64)> {
         let times = Self::ALL.into_iter().zip(milliseconds);
-        times
-            .filter(|(_, ms)| **ms > 0.0)
-            .map(|(pass, ms)| (pass.name(), *ms))
-            .collect()
+        times.filter(|(_, ms)| **ms > 0.0).map(|(pass, ms)| (pass.name(), *ms)).collect()
     }
 
     pub fn name(self) -> &'static str {
@@ -144,18 +141,12 @@ impl Timers {
     /// The buffer to read back and its used size; `None` without a clock.
     pub fn buffer(&self) -> Option<(&Buffer, u64)> {
         let clock = self.0.as_ref()?;
-        Some((
-            &clock.resolved,
-            (clock.passes.len() as u64 - 1).clamp(1, clock.blocks) * BLOCK,
-        ))
+        Some((&clock.resolved, (clock.passes.len() as u64 - 1).clamp(1, clock.blocks) * BLOCK))
     }
 
     /// How to read what [`Self::buffer`] holds now, also when later frames have begun; `None` without a clock.
     pub fn reading(&self) -> Option<Reading> {
-        self.0.as_ref().map(|c| Reading {
-            period: c.period,
-            passes: c.passes.clone(),
-        })
+        self.0.as_ref().map(|c| Reading { period: c.period, passes: c.passes.clone() })
     }
 }
 

@@ -56,14 +56,8 @@ impl ViewUniform {
             offset,
             near: NEAR * diagonal,
             least_distance: frame.least_distance,
-            specular: if surface.reflection {
-                surface.specular as f32
-            } else {
-                0.0
-            },
-            alpha: (surface.roughness as f32)
-                .max(crate::cpu::surface::LEAST_ROUGHNESS)
-                .powi(2),
+            specular: if surface.reflection { surface.specular as f32 } else { 0.0 },
+            alpha: (surface.roughness as f32).max(crate::cpu::surface::LEAST_ROUGHNESS).powi(2),
             rays,
             unused: 0,
         }
@@ -95,11 +89,7 @@ impl MediumUniform {
     pub fn new(asset: &Asset) -> Self {
         let info = &asset.info;
         let extinction = DVec3::from(info.extinction);
-        let along = if asset.density.is_some() {
-            extinction
-        } else {
-            extinction * info.uniform_density
-        };
+        let along = if asset.density.is_some() { extinction } else { extinction * info.uniform_density };
         let reference = info.reference_extinction;
         let (encoding, epsilon) = match info.encoding {
             Encoding::Transmittance => (0, 0.0),
@@ -111,11 +101,7 @@ impl MediumUniform {
             order: info.order,
             extinction: extinction.as_vec3(),
             samples: asset.samples.len() as u32,
-            ratio: if reference > 0.0 {
-                (extinction / reference).as_vec3()
-            } else {
-                Vec3::ZERO
-            },
+            ratio: if reference > 0.0 { (extinction / reference).as_vec3() } else { Vec3::ZERO },
             encoding,
             albedo: DVec3::from(info.albedo).as_vec3(),
             epsilon,
@@ -171,13 +157,7 @@ mod tests {
 
     /// Fields of a WGSL struct with WGSL's offsets, and its size.
     fn wgsl(source: &str, name: &str) -> (Vec<(String, usize)>, usize) {
-        let body = source
-            .split(&format!("struct {name} {{"))
-            .nth(1)
-            .unwrap()
-            .split('}')
-            .next()
-            .unwrap();
+        let body = source.split(&format!("struct {name} {{")).nth(1).unwrap().split('}').next().unwrap();
         let (mut at, mut align_all, mut fields) = (0usize, 4, Vec::new());
         for line in body.lines() {
             let line = line.split("//").next().unwrap().trim().trim_end_matches(',');

@@ -53,9 +53,7 @@ fn compare_rays(name: &str, asset: &Asset, frame: &Frame, exact: Option<&ExactDe
         let got = gpu.trace_rays(frame, exact, offset).unwrap();
         assert_eq!(got.len(), expected.len());
         for (a, b) in got.iter().zip(&expected) {
-            let difference = (0..3)
-                .map(|c| (a.radiance[c] - b.radiance[c]).abs())
-                .fold(0.0, f32::max);
+            let difference = (0..3).map(|c| (a.radiance[c] - b.radiance[c]).abs()).fold(0.0, f32::max);
             assert!(a.radiance.iter().all(|v| v.is_finite()));
             peak = b.radiance.iter().fold(peak, |p, v| p.max(*v));
             rays += 1;
@@ -78,124 +76,52 @@ fn compare_rays(name: &str, asset: &Asset, frame: &Frame, exact: Option<&ExactDe
         elsewhere / peak
     );
     assert!(peak > 0.0 && hits * 5 > rays, "{name} shows nothing");
-    assert!(
-        rays - agreeing <= hits / 200,
-        "{name}: {} of {hits} rays disagree",
-        rays - agreeing
-    );
+    assert!(rays - agreeing <= hits / 200, "{name}: {} of {hits} rays disagree", rays - agreeing);
     assert!(relative <= 1e-4, "{name}: {relative}");
 }
 
 #[test]
 fn ball_from_outside() {
     let asset = ball().build();
-    compare_rays(
-        "ball",
-        &asset,
-        &Frame::new(&scene(outside()), &asset.info).unwrap(),
-        None,
-    );
+    compare_rays("ball", &asset, &Frame::new(&scene(outside()), &asset.info).unwrap(), None);
 }
 
 #[test]
 fn coloured_extinction_and_forward_phase() {
     let phase = Phase::HenyeyGreenstein { g: 0.6 };
-    let asset = Object {
-        extinction: [2.0, 5.0, 11.0],
-        phase,
-        order: 7,
-        ..ball()
-    }
-    .build();
-    compare_rays(
-        "coloured ball",
-        &asset,
-        &Frame::new(&scene(outside()), &asset.info).unwrap(),
-        None,
-    );
+    let asset = Object { extinction: [2.0, 5.0, 11.0], phase, order: 7, ..ball() }.build();
+    compare_rays("coloured ball", &asset, &Frame::new(&scene(outside()), &asset.info).unwrap(), None);
 }
 
 #[test]
 fn stored_transmittance_at_low_and_high_order() {
     for order in [1, 10] {
-        let asset = Object {
-            encoding: Encoding::Transmittance,
-            order,
-            spacing: 0.3,
-            ..ball()
-        }
-        .build();
-        compare_rays(
-            "transmittance",
-            &asset,
-            &Frame::new(&scene(outside()), &asset.info).unwrap(),
-            None,
-        );
+        let asset = Object { encoding: Encoding::Transmittance, order, spacing: 0.3, ..ball() }.build();
+        compare_rays("transmittance", &asset, &Frame::new(&scene(outside()), &asset.info).unwrap(), None);
     }
 }
 
 #[test]
 fn density_grid() {
-    let asset = Object {
-        density: Some(uneven_grid()),
-        ..ball()
-    }
-    .build();
-    compare_rays(
-        "uneven ball",
-        &asset,
-        &Frame::new(&scene(outside()), &asset.info).unwrap(),
-        None,
-    );
-    let asset = Object {
-        density: Some(uneven_grid()),
-        extinction: [2.0, 5.0, 11.0],
-        ..torus()
-    }
-    .build();
-    compare_rays(
-        "uneven torus",
-        &asset,
-        &Frame::new(&scene(outside()), &asset.info).unwrap(),
-        None,
-    );
+    let asset = Object { density: Some(uneven_grid()), ..ball() }.build();
+    compare_rays("uneven ball", &asset, &Frame::new(&scene(outside()), &asset.info).unwrap(), None);
+    let asset = Object { density: Some(uneven_grid()), extinction: [2.0, 5.0, 11.0], ..torus() }.build();
+    compare_rays("uneven torus", &asset, &Frame::new(&scene(outside()), &asset.info).unwrap(), None);
 }
 
 #[test]
 fn refracting_boundary() {
     let asset = Object { ior: 1.5, ..ball() }.build();
-    compare_rays(
-        "glassy ball",
-        &asset,
-        &Frame::new(&scene(outside()), &asset.info).unwrap(),
-        None,
-    );
+    compare_rays("glassy ball", &asset, &Frame::new(&scene(outside()), &asset.info).unwrap(), None);
     let asset = Object { ior: 1.3, ..torus() }.build();
-    compare_rays(
-        "glassy torus",
-        &asset,
-        &Frame::new(&scene(outside()), &asset.info).unwrap(),
-        None,
-    );
+    compare_rays("glassy torus", &asset, &Frame::new(&scene(outside()), &asset.info).unwrap(), None);
 }
 
 #[test]
 fn camera_inside() {
-    for object in [
-        ball(),
-        Object {
-            density: Some(uneven_grid()),
-            ior: 1.5,
-            ..ball()
-        },
-    ] {
+    for object in [ball(), Object { density: Some(uneven_grid()), ior: 1.5, ..ball() }] {
         let asset = object.build();
-        compare_rays(
-            "ball from inside",
-            &asset,
-            &Frame::new(&scene(inside()), &asset.info).unwrap(),
-            None,
-        );
+        compare_rays("ball from inside", &asset, &Frame::new(&scene(inside()), &asset.info).unwrap(), None);
     }
 }
 
@@ -206,10 +132,7 @@ fn two_pieces_of_a_torus() {
     compare_rays("torus", &asset, &frame, None);
     let Some(mut gpu) = gpu(&asset) else { return };
     let rays = gpu.trace_rays(&frame, None, [0.5; 2]).unwrap();
-    assert!(
-        rays.iter().filter(|r| r.count == 2).count() > 500,
-        "the view runs through both sides"
-    );
+    assert!(rays.iter().filter(|r| r.count == 2).count() > 500, "the view runs through both sides");
 }
 
 #[test]
@@ -218,9 +141,7 @@ fn exact_depths() {
     let mut scene = scene(outside());
     scenes::put_light_inside(&mut scene);
     let frame = Frame::new(&scene, &asset.info).unwrap();
-    let exact = DepthTracer::new(&asset)
-        .unwrap()
-        .trace(&frame, &[0, frame.scene_lights - 1]);
+    let exact = DepthTracer::new(&asset).unwrap().trace(&frame, &[0, frame.scene_lights - 1]);
     compare_rays("exact depths", &asset, &frame, Some(&exact));
 }
 
@@ -236,17 +157,9 @@ fn whole_pictures_agree() {
         let frame = Frame::new(&scene, &asset.info).unwrap();
         let a = gpu.render(&frame, None).unwrap();
         let b = CpuRenderer::new(&asset).unwrap().render(&frame, None);
-        assert_eq!(
-            (a.picture.width, a.picture.height),
-            (b.picture.width, b.picture.height)
-        );
+        assert_eq!((a.picture.width, a.picture.height), (b.picture.width, b.picture.height));
         let flat = |r: &diaphane_runtime::rendered::Rendered| -> Vec<f64> {
-            r.picture
-                .pixels
-                .as_flattened()
-                .iter()
-                .map(|v| f64::from(*v))
-                .collect()
+            r.picture.pixels.as_flattened().iter().map(|v| f64::from(*v)).collect()
         };
         let (x, y) = (flat(&a), flat(&b));
         let square: f64 = y.iter().map(|v| v * v).sum();
@@ -265,13 +178,7 @@ fn whole_pictures_agree() {
             p.rays == q.rays && p.samples_drawn == q.samples_drawn && p.pieces_dropped == q.pieces_dropped
         );
         assert!(near(p.rays_hit, q.rays_hit) && near(p.splats, q.splats) && near(p.uncovered, q.uncovered));
-        let coverage = a
-            .picture
-            .coverage
-            .as_ref()
-            .unwrap()
-            .iter()
-            .zip(b.picture.coverage.as_ref().unwrap());
+        let coverage = a.picture.coverage.as_ref().unwrap().iter().zip(b.picture.coverage.as_ref().unwrap());
         assert!(coverage.filter(|(p, q)| (**p - **q).abs() > 0.01).count() < 20);
     }
 }
@@ -293,18 +200,12 @@ fn size_and_lights_may_change() {
     let asset = ball().build();
     let Some(mut gpu) = gpu(&asset) else { return };
     let mut scene = scene(outside());
-    let full = gpu
-        .render(&Frame::new(&scene, &asset.info).unwrap(), None)
-        .unwrap();
+    let full = gpu.render(&Frame::new(&scene, &asset.info).unwrap(), None).unwrap();
     scene.lights.clear();
     (scene.image.width, scene.image.height) = (17, 31);
-    let dark = gpu
-        .render(&Frame::new(&scene, &asset.info).unwrap(), None)
-        .unwrap();
+    let dark = gpu.render(&Frame::new(&scene, &asset.info).unwrap(), None).unwrap();
     assert!(dark.picture.pixels.iter().all(|p| *p == [0.0; 3]) && dark.counters.rays_hit > 0);
-    let again = gpu
-        .render(&Frame::new(&scenes::scene(outside()), &asset.info).unwrap(), None)
-        .unwrap();
+    let again = gpu.render(&Frame::new(&scenes::scene(outside()), &asset.info).unwrap(), None).unwrap();
     assert!(full.picture == again.picture);
 }
 
@@ -323,28 +224,14 @@ fn a_host_program_gets_the_same_picture() {
     // One ray first, then the other three on top.
     for rays in [0..1, 1..4] {
         let mut encoder = device.create_command_encoder(&Default::default());
-        let request = Request {
-            frame: &frame,
-            exact: None,
-            rays,
-            exposure: 1.0,
-        };
+        let request = Request { frame: &frame, exact: None, rays, exposure: 1.0 };
         renderer.prepare(device, queue, &mut encoder, &request).unwrap();
         queue.submit([encoder.finish()]);
         renderer.statistics();
     }
     let picture = renderer.read_picture(device, queue).unwrap();
-    let peak = expected
-        .picture
-        .pixels
-        .as_flattened()
-        .iter()
-        .fold(0.0, |a: f32, b| a.max(*b));
-    let pairs = picture
-        .pixels
-        .as_flattened()
-        .iter()
-        .zip(expected.picture.pixels.as_flattened());
+    let peak = expected.picture.pixels.as_flattened().iter().fold(0.0, |a: f32, b| a.max(*b));
+    let pairs = picture.pixels.as_flattened().iter().zip(expected.picture.pixels.as_flattened());
     assert!(pairs.clone().all(|(a, b)| (a - b).abs() <= 1e-6 * peak));
     assert_eq!(picture.coverage, expected.picture.coverage);
     host.check().unwrap();
@@ -356,9 +243,7 @@ fn no_samples_no_light() {
     object.inside = |_| false;
     let asset = object.build();
     let Some(mut gpu) = gpu(&asset) else { return };
-    let rendered = gpu
-        .render(&Frame::new(&scene(outside()), &asset.info).unwrap(), None)
-        .unwrap();
+    let rendered = gpu.render(&Frame::new(&scene(outside()), &asset.info).unwrap(), None).unwrap();
     assert!(rendered.picture.pixels.iter().all(|p| *p == [0.0; 3]));
     assert_eq!(rendered.counters.uncovered, rendered.counters.rays_hit);
 }

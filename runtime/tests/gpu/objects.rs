@@ -77,19 +77,11 @@ pub fn uneven_grid() -> DensityGrid {
             for x in 0..n[0] {
                 let random = hash(11, u64::from((z * n[1] + y) * n[0] + x)) as f32 / 2f32.powi(64);
                 let density = 0.3 + 1.6 * random;
-                values.push([
-                    f16::from_f32(density),
-                    f16::from_f32(density * (0.5 + 0.5 * random)),
-                ]);
+                values.push([f16::from_f32(density), f16::from_f32(density * (0.5 + 0.5 * random))]);
             }
         }
     }
-    DensityGrid {
-        size: n,
-        min: [-1.1; 3],
-        max: [1.1; 3],
-        values,
-    }
+    DensityGrid { size: n, min: [-1.1; 3], max: [1.1; 3], values }
 }
 
 impl Object {
@@ -121,17 +113,11 @@ impl Object {
             let x = p.as_dvec3();
             samples.offset.push([0; 4]);
             samples.position_radius.push([p.x, p.y, p.z, 0.55 * self.spacing]);
-            samples
-                .weight
-                .push(0.5 + hash(3, u64::from(p.x.to_bits())) as f32 / 2f32.powi(64));
-            samples
-                .depth
-                .extend(project(&|d| self.encoding.encode(reference * chord(x, d))));
+            samples.weight.push(0.5 + hash(3, u64::from(p.x.to_bits())) as f32 / 2f32.powi(64));
+            samples.depth.extend(project(&|d| self.encoding.encode(reference * chord(x, d))));
             if self.ior != 1.0 {
                 let exit = |d: DVec3| (x + d * chord(x, d)).normalize().dot(d);
-                samples
-                    .boundary
-                    .extend(project(&|d| fresnel::transmittance(exit(d), self.ior)));
+                samples.boundary.extend(project(&|d| fresnel::transmittance(exit(d), self.ior)));
             }
         }
         let low = self.positions.iter().fold(Vec3::INFINITY, |a, p| a.min(*p));
@@ -209,10 +195,7 @@ fn icosphere(levels: u32) -> (Vec<Vec3>, Vec<[u32; 3]>) {
         for b in a + 1..12 {
             for c in b + 1..12 {
                 let [p, q, r] = [a, b, c].map(|i| positions[i as usize]);
-                if [p.distance(q), q.distance(r), r.distance(p)]
-                    .iter()
-                    .all(|d| (d - 2.0).abs() < 1e-3)
-                {
+                if [p.distance(q), q.distance(r), r.distance(p)].iter().all(|d| (d - 2.0).abs() < 1e-3) {
                     let outwards = (q - p).cross(r - p).dot(p) > 0.0;
                     triangles.push(if outwards { [a, b, c] } else { [a, c, b] });
                 }

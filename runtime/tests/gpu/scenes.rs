@@ -16,10 +16,7 @@ pub fn outside() -> Camera {
 
 /// Looks along the plane of the torus.
 pub fn level() -> Camera {
-    Camera {
-        position: CENTRE + DVec3::new(0.4, 0.2, 3.0),
-        ..outside()
-    }
+    Camera { position: CENTRE + DVec3::new(0.4, 0.2, 3.0), ..outside() }
 }
 
 pub fn inside() -> Camera {
@@ -35,16 +32,8 @@ pub fn inside() -> Camera {
 pub fn scene(camera: Camera) -> Scene {
     Scene {
         camera,
-        image: ImageSize {
-            width: 112,
-            height: 96,
-            samples_per_pixel: 1,
-        },
-        surface: Surface {
-            reflection: false,
-            specular: 0.5,
-            roughness: 0.3,
-        },
+        image: ImageSize { width: 112, height: 96, samples_per_pixel: 1 },
+        surface: Surface { reflection: false, specular: 0.5, roughness: 0.3 },
         environment: None,
         lights: vec![
             Light::Point {
@@ -69,8 +58,5 @@ pub fn scene(camera: Camera) -> Scene {
 /// Adds a light where only exact depths are right.
 pub fn put_light_inside(scene: &mut Scene) {
     let position = CENTRE + DVec3::new(0.1, 0.3, 0.2);
-    scene.lights.push(Light::Point {
-        position,
-        intensity: DVec3::new(0.3, 0.2, 0.1),
-    });
+    scene.lights.push(Light::Point { position, intensity: DVec3::new(0.3, 0.2, 0.1) });
 }

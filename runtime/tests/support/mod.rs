@@ -44,19 +44,14 @@ pub fn sphere_mesh(levels: usize) -> Mesh {
             .into_iter()
             .flat_map(|[a, b, c]| {
                 let unit = |p: DVec3| p.normalize();
-                let (ab, bc, ca) = (
-                    unit(unit(a) + unit(b)),
-                    unit(unit(b) + unit(c)),
-                    unit(unit(c) + unit(a)),
-                );
+                let (ab, bc, ca) =
+                    (unit(unit(a) + unit(b)), unit(unit(b) + unit(c)), unit(unit(c) + unit(a)));
                 [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]
             })
             .collect();
     }
     let corners: Vec<DVec3> = triangles.iter().flatten().map(|p| p.normalize()).collect();
-    let indices = (0..triangles.len() as u32)
-        .map(|i| [3 * i, 3 * i + 1, 3 * i + 2])
-        .collect();
+    let indices = (0..triangles.len() as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
     // Midpoints of an edge come out the same from both sides up to rounding: weld on a fine lattice.
     let lattice = corners.iter().map(|p| (*p * 1e9).round() / 1e9).collect();
     Mesh::from_triangles(lattice, indices).unwrap().0
@@ -150,16 +145,8 @@ pub fn scene(centre: DVec3, side: u32, rays: u32, lights: Vec<Light>) -> Scene {
             up: DVec3::Y,
             vertical_fov_degrees: 28.0,
         },
-        image: ImageSize {
-            width: side,
-            height: side,
-            samples_per_pixel: rays,
-        },
-        surface: Surface {
-            reflection: false,
-            specular: 0.5,
-            roughness: 0.3,
-        },
+        image: ImageSize { width: side, height: side, samples_per_pixel: rays },
+        surface: Surface { reflection: false, specular: 0.5, roughness: 0.3 },
         environment: None,
         lights,
     }
@@ -167,10 +154,7 @@ pub fn scene(centre: DVec3, side: u32, rays: u32, lights: Vec<Light>) -> Scene {
 
 /// A point light at a place relative to `centre`.
 pub fn point(centre: DVec3, position: DVec3, intensity: f64) -> Light {
-    Light::Point {
-        position: centre + position,
-        intensity: DVec3::splat(intensity),
-    }
+    Light::Point { position: centre + position, intensity: DVec3::splat(intensity) }
 }
 
 /// Single scattering of the ball along a ray (relative to its centre), by the midpoint rule with exact light

@@ -71,10 +71,7 @@ fn find_coverage(file: Option<&Path>, reference: &Picture) -> anyhow::Result<(Ve
         Some(coverage) => (coverage.clone(), "the reference's alpha".to_owned()),
         None => {
             let lit = |p: &[f32; 3]| f32::from(u8::from(p.iter().any(|v| *v > 0.0)));
-            (
-                reference.pixels.iter().map(lit).collect(),
-                "pixels above 0 in the reference".to_owned(),
-            )
+            (reference.pixels.iter().map(lit).collect(), "pixels above 0 in the reference".to_owned())
         }
     })
 }

@@ -58,11 +58,8 @@ pub fn run(a: &Arguments) -> anyhow::Result<bool> {
     for (files, object) in written.iter().zip(diaphane_assets::OBJECTS) {
         let folder = a.output_dir.join(object.name);
         make_folder(&folder)?;
-        let inputs = Inputs {
-            mesh: files.mesh.clone(),
-            material: files.material.clone(),
-            scene: files.scene.clone(),
-        };
+        let inputs =
+            Inputs { mesh: files.mesh.clone(), material: files.material.clone(), scene: files.scene.clone() };
         let (case, line) = object_case(a, object.name, object.title, &inputs, &folder)?;
         warn(&case.played.warnings);
         write_pictures(&folder, &case)?;
@@ -100,14 +97,9 @@ fn object_case(
     let (_, mesh_report) = mesh::load_obj(&inputs.mesh)?;
     let display = Display::new(&format!("{name}: bake"));
     display.announce();
-    let params = Params {
-        samples: a.samples,
-        ..Params::preset(Preset::Standard)
-    };
-    let file_name = |p: &PathBuf| {
-        p.file_name()
-            .map_or_else(String::new, |n| n.to_string_lossy().into_owned())
-    };
+    let params = Params { samples: a.samples, ..Params::preset(Preset::Standard) };
+    let file_name =
+        |p: &PathBuf| p.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
     let input = Input {
         mesh: &loaded.mesh,
         mesh_report: &mesh_report,
@@ -124,15 +116,11 @@ fn object_case(
     // What is played is what was written.
     let baked = asset::read(&path)?;
     let played = play(&baked, &loaded.scene, a.backend.into(), LightMode::Baked, 2)?;
-    let settings = Settings {
-        tolerance: NOISE,
-        ..Settings::default()
-    };
+    let settings = Settings { tolerance: NOISE, ..Settings::default() };
     let display = Display::new(&format!("{name}: reference"));
     let begun = Instant::now();
-    let reference = render(&loaded.mesh, &loaded.medium, &loaded.scene, &settings, &|p| {
-        display.reference(p)
-    })?;
+    let reference =
+        render(&loaded.mesh, &loaded.medium, &loaded.scene, &settings, &|p| display.reference(p))?;
     let reference_seconds = begun.elapsed().as_secs_f64();
     display.finish();
     let coverage = reference.picture.coverage.clone().unwrap_or_default();
@@ -154,16 +142,7 @@ fn object_case(
         ("reference", format!("{reference_seconds:.1} s")),
     ];
     let facts = facts.map(|(n, v)| (n.to_owned(), v)).to_vec();
-    Ok((
-        Case {
-            title: format!("{name}: {title}"),
-            played,
-            reference,
-            metrics,
-            facts,
-        },
-        line,
-    ))
+    Ok((Case { title: format!("{name}: {title}"), played, reference, metrics, facts }, line))
 }
 
 fn print_table(cases: &[Case], lines: &[Line]) {

@@ -94,10 +94,7 @@ impl From<LightName> for LightMode {
 /// Plays, renders, compares, writes.
 pub fn run(a: &Arguments) -> anyhow::Result<bool> {
     if let Some(e) = a.max_error {
-        anyhow::ensure!(
-            e >= 0.0,
-            "--max-error must be a number that is not negative, not {e}"
-        );
+        anyhow::ensure!(e >= 0.0, "--max-error must be a number that is not negative, not {e}");
     }
     anyhow::ensure!(
         a.tolerance > 0.0 && a.tolerance.is_finite(),
@@ -121,15 +118,10 @@ pub fn run(a: &Arguments) -> anyhow::Result<bool> {
         );
     }
     warn(&played.warnings);
-    let settings = Settings {
-        tolerance: a.tolerance,
-        seed: a.seed,
-        ..Settings::default()
-    };
+    let settings = Settings { tolerance: a.tolerance, seed: a.seed, ..Settings::default() };
     let display = Display::new("reference");
-    let reference = render(&loaded.mesh, &loaded.medium, &loaded.scene, &settings, &|p| {
-        display.reference(p)
-    })?;
+    let reference =
+        render(&loaded.mesh, &loaded.medium, &loaded.scene, &settings, &|p| display.reference(p))?;
     display.finish();
     let coverage = reference.picture.coverage.clone().unwrap_or_default();
     let metrics = compare(&played.picture, &reference.picture, &coverage)?;
@@ -143,10 +135,7 @@ pub fn run(a: &Arguments) -> anyhow::Result<bool> {
         ("lights", loaded.scene.lights.len().to_string()),
     ];
     let case = Case {
-        title: a
-            .asset
-            .file_stem()
-            .map_or_else(String::new, |s| s.to_string_lossy().into_owned()),
+        title: a.asset.file_stem().map_or_else(String::new, |s| s.to_string_lossy().into_owned()),
         played,
         reference,
         metrics,
@@ -156,30 +145,18 @@ pub fn run(a: &Arguments) -> anyhow::Result<bool> {
     let heading = format!("{} against the reference", case.title);
     write_report(&a.output_dir, &heading, std::slice::from_ref(&case))?;
     print_metrics(&metrics);
-    say(&format!(
-        "noise      {:.5}  (of the reference)",
-        case.reference.error
-    ));
+    say(&format!("noise      {:.5}  (of the reference)", case.reference.error));
     say(&format!(
         "frame      {:.1} ms on {} ({})",
         case.played.frame_ms, case.played.backend, case.played.adapter
     ));
-    say(&format!(
-        "report     {}",
-        a.output_dir.join("report.html").display()
-    ));
+    say(&format!("report     {}", a.output_dir.join("report.html").display()));
     let good = a.max_error.is_none_or(|e| metrics.rel_rmse <= e);
     if let (false, Some(e)) = (good, a.max_error) {
-        tell(&format!(
-            "check failed: rel_rmse {:.5} is above {e}",
-            metrics.rel_rmse
-        ));
+        tell(&format!("check failed: rel_rmse {:.5} is above {e}", metrics.rel_rmse));
     }
     if metrics.non_finite > 0 {
-        tell(&format!(
-            "check failed: {} values are not finite",
-            metrics.non_finite
-        ));
+        tell(&format!("check failed: {} values are not finite", metrics.non_finite));
     }
     Ok(good && metrics.non_finite == 0)
 }

@@ -8,6 +8,7 @@ pub mod progress;
 pub mod reference;
 
 use anyhow::Context;
+use diaphane_formats::one_line;
 use diaphane_formats::{files, material, medium::Medium, mesh, mesh::Mesh, scene, scene::Scene};
 use std::path::{Path, PathBuf};
 
@@ -47,12 +48,7 @@ impl Inputs {
         if scene.lights.is_empty() && scene.environment.is_none() {
             warnings.push("the scene has no lights; the picture will be black".to_owned());
         }
-        Ok(Loaded {
-            mesh,
-            medium,
-            scene,
-            warnings,
-        })
+        Ok(Loaded { mesh, medium, scene, warnings })
     }
 
     /// Fails when `output` is one of the inputs.
@@ -73,17 +69,9 @@ pub fn make_folder(path: &Path) -> anyhow::Result<()> {
 pub fn check_folder(path: &Path) -> anyhow::Result<()> {
     // The empty path that ends a relative one stands for the current folder.
     let real = |p: &Path| {
-        if p.as_os_str().is_empty() {
-            PathBuf::from(".")
-        } else {
-            p.to_path_buf()
-        }
+        if p.as_os_str().is_empty() { PathBuf::from(".") } else { p.to_path_buf() }
     };
-    let found = path
-        .ancestors()
-        .map(real)
-        .find(|p| p.exists())
-        .unwrap_or_else(|| PathBuf::from("."));
+    let found = path.ancestors().map(real).find(|p| p.exists()).unwrap_or_else(|| PathBuf::from("."));
     anyhow::ensure!(
         found.is_dir(),
         "'{}' cannot be a folder: '{}' is a file",
@@ -93,14 +81,7 @@ pub fn check_folder(path: &Path) -> anyhow::Result<()> {
     Ok(files::require_writable(&found.join("report.html"))?)
 }
 
-/// Text without line breaks.
-pub fn one_line(text: &str) -> String {
-    text.split_whitespace().collect::<Vec<_>>().join(" ")
-}
-
 /// The first paragraph of clap's message and where to read more.
 pub fn usage_error(e: &clap::Error) -> String {
-    let text = e.to_string();
-    let first = text.split("\n\n").next().unwrap_or("error: wrong usage");
-    format!("{first} (see --help)")
+    format!("{} (see --help)", one_line(&e.to_string()))
 }

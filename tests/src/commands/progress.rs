@@ -23,11 +23,7 @@ impl Display {
             bar.set_prefix(label.to_owned());
             bar
         });
-        Self {
-            bar,
-            label: label.to_owned(),
-            printed: std::sync::atomic::AtomicU32::new(u32::MAX),
-        }
+        Self { bar, label: label.to_owned(), printed: std::sync::atomic::AtomicU32::new(u32::MAX) }
     }
 
     /// Progress of the reference.

@@ -31,9 +31,7 @@ pub struct Arguments {
 /// Renders and writes the picture.
 pub fn run(a: &Arguments) -> anyhow::Result<bool> {
     anyhow::ensure!(
-        a.output
-            .extension()
-            .is_some_and(|e| e.eq_ignore_ascii_case("exr")),
+        a.output.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr")),
         "'{}': the reference is linear radiance; name an .exr file",
         a.output.display()
     );
@@ -46,16 +44,11 @@ pub fn run(a: &Arguments) -> anyhow::Result<bool> {
     a.inputs.require_different(&a.output)?;
     files::require_writable(&a.output)?;
     warn(&loaded.warnings);
-    let settings = Settings {
-        tolerance: a.tolerance,
-        seed: a.seed,
-        ..Settings::default()
-    };
+    let settings = Settings { tolerance: a.tolerance, seed: a.seed, ..Settings::default() };
     let start = Instant::now();
     let display = Display::new("reference");
-    let reference = render(&loaded.mesh, &loaded.medium, &loaded.scene, &settings, &|p| {
-        display.reference(p)
-    })?;
+    let reference =
+        render(&loaded.mesh, &loaded.medium, &loaded.scene, &settings, &|p| display.reference(p))?;
     display.finish();
     picture::write_exr(&a.output, &reference.picture)?;
     let picture = &reference.picture;

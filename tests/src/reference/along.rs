@@ -60,12 +60,7 @@ pub fn in_homogeneous(kappa: DVec3, rho: f64, stretches: &[Stretch], u: f64) -> 
         let length = stretch.end - stretch.start;
         if s <= before + length || i + 1 == stretches.len() {
             let t = (stretch.start + (s - before)).min(stretch.end);
-            return Some(Position {
-                t,
-                density,
-                view: rho * s,
-                boundary: stretch.reached,
-            });
+            return Some(Position { t, density, view: rho * s, boundary: stretch.reached });
         }
         before += length;
     }
@@ -110,11 +105,7 @@ fn invert(kappa: DVec3, total: f64, u: f64) -> (f64, f64) {
             high = s
         }
         let next = s + (u - f) / p;
-        let next = if next > low && next < high {
-            next
-        } else {
-            0.5 * (low + high)
-        };
+        let next = if next > low && next < high { next } else { 0.5 * (low + high) };
         if (next - s).abs() <= 1e-12 * total {
             s = next;
             break;
@@ -134,19 +125,13 @@ pub fn in_field(
     u: f64,
 ) -> Option<Position> {
     fill(kappa, field, origin, direction, &scratch.stretches, march);
-    let (seen, scattering) = march
-        .cells
-        .iter()
-        .fold((0.0, 0.0), |(a, b), c| (a + c.seen, b + c.scattering));
+    let (seen, scattering) = march.cells.iter().fold((0.0, 0.0), |(a, b), c| (a + c.seen, b + c.scattering));
     if scattering <= 0.0 {
         return None;
     }
     // Where exp(-τ) underflows for every cell, only the uniform part is left.
-    let (per_seen, per_scattering) = if seen > 0.0 {
-        ((1.0 - UNIFORM) / seen, UNIFORM / scattering)
-    } else {
-        (0.0, 1.0 / scattering)
-    };
+    let (per_seen, per_scattering) =
+        if seen > 0.0 { ((1.0 - UNIFORM) / seen, UNIFORM / scattering) } else { (0.0, 1.0 / scattering) };
     let weight = |c: &Cell| c.seen * per_seen + c.scattering * per_scattering;
     let mut rest = u;
     let last = march.cells.iter().rposition(|c| weight(c) > 0.0)?;
@@ -157,12 +142,7 @@ pub fn in_field(
             let (x, relative) = on_line(cell.ends, (rest / w).clamp(0.0, 1.0));
             let t = cell.start + length * x;
             let view = cell.before + field.smooth_part(origin, direction, cell.start, t);
-            return Some(Position {
-                t,
-                density: w * relative / length,
-                view,
-                boundary: cell.boundary,
-            });
+            return Some(Position { t, density: w * relative / length, view, boundary: cell.boundary });
         }
         rest -= w;
     }
@@ -193,11 +173,7 @@ fn fill(
     };
     let grey = kappa.x == kappa.y && kappa.y == kappa.z;
     let sloped = matches!(field.density(), Density::Grid(_) | Density::Noise(_));
-    let Marching {
-        cells,
-        cuts,
-        crossings,
-    } = march;
+    let Marching { cells, cuts, crossings } = march;
     cells.clear();
     let mut before = 0.0;
     for stretch in stretches {
@@ -205,20 +181,10 @@ fn fill(
         for pair in cuts.windows(2) {
             let (start, length) = (pair[0], pair[1] - pair[0]);
             let mass = field.smooth_part(origin, direction, pair[0], pair[1]);
-            let parts = (mass * kappa.max_element() / 0.5)
-                .max(16.0 * length / total)
-                .ceil()
-                .clamp(1.0, 64.0);
+            let parts = (mass * kappa.max_element() / 0.5).max(16.0 * length / total).ceil().clamp(1.0, 64.0);
             for i in 0..parts as usize {
-                let (a, b) = (
-                    start + length * i as f64 / parts,
-                    start + length * (i + 1) as f64 / parts,
-                );
-                let own = if parts > 1.0 {
-                    field.smooth_part(origin, direction, a, b)
-                } else {
-                    mass
-                };
+                let (a, b) = (start + length * i as f64 / parts, start + length * (i + 1) as f64 / parts);
+                let own = if parts > 1.0 { field.smooth_part(origin, direction, a, b) } else { mass };
                 let scattering = scatters(a, b, own);
                 let middle = before + 0.5 * own;
                 let eye = if grey {
@@ -258,25 +224,10 @@ mod tests {
     #[test]
     fn homogeneous_draws_follow_their_density() {
         let stretches = [
-            Stretch {
-                start: 1.0,
-                end: 1.5,
-                reached: 0.9,
-                leaving: 1.0,
-            },
-            Stretch {
-                start: 2.0,
-                end: 4.0,
-                reached: 0.7,
-                leaving: 1.0,
-            },
+            Stretch { start: 1.0, end: 1.5, reached: 0.9, leaving: 1.0 },
+            Stretch { start: 2.0, end: 4.0, reached: 0.7, leaving: 1.0 },
         ];
-        for kappa in [
-            DVec3::splat(3.0),
-            DVec3::new(0.0, 1.0, 20.0),
-            DVec3::ZERO,
-            DVec3::splat(400.0),
-        ] {
+        for kappa in [DVec3::splat(3.0), DVec3::new(0.0, 1.0, 20.0), DVec3::ZERO, DVec3::splat(400.0)] {
             // The mean of 1/density is the length that the draws cover, and of t/density the first moment.
             let n = 200_000;
             let (mut length, mut moment) = (0.0, 0.0);
@@ -289,37 +240,19 @@ mod tests {
                 assert!((p.view - s).abs() < 1e-9);
             }
             assert!((length / f64::from(n) - 2.5).abs() < 1e-3, "{kappa}: {length}");
-            assert!(
-                (moment / f64::from(n) - (0.625 + 6.0)).abs() < 4e-3,
-                "{kappa}: {moment}"
-            );
+            assert!((moment / f64::from(n) - (0.625 + 6.0)).abs() < 4e-3, "{kappa}: {moment}");
         }
     }
 
     #[test]
     fn fields_are_drawn_where_they_scatter() {
         use diaphane_formats::medium::{Shape, Shapes, Solid};
-        let solid = Solid::Sphere {
-            center: DVec3::ZERO,
-            radius: 0.25,
-        };
-        let shapes = Shapes {
-            base: 2.0,
-            shapes: vec![Shape {
-                solid,
-                density: 5.0,
-                absorb: true,
-            }],
-        };
+        let solid = Solid::Sphere { center: DVec3::ZERO, radius: 0.25 };
+        let shapes = Shapes { base: 2.0, shapes: vec![Shape { solid, density: 5.0, absorb: true }] };
         let density = Density::Shapes(shapes);
         let field = Field::new(&density);
         let mut scratch = Scratch::default();
-        scratch.stretches.push(Stretch {
-            start: 1.0,
-            end: 3.0,
-            reached: 1.0,
-            leaving: 1.0,
-        });
+        scratch.stretches.push(Stretch { start: 1.0, end: 3.0, reached: 1.0, leaving: 1.0 });
         let mut march = Marching::default();
         let n = 20_000;
         let mut length = 0.0;
@@ -328,11 +261,7 @@ mod tests {
             let origin = DVec3::new(0.0, 0.0, -2.0);
             let p = in_field((DVec3::ONE, &field), origin, DVec3::Z, &scratch, &mut march, u).unwrap();
             assert!((p.t - 2.0).abs() > 0.25 - 1e-9, "{}", p.t);
-            let expected = if p.t < 2.0 {
-                2.0 * (p.t - 1.0)
-            } else {
-                1.5 + 2.5 + 2.0 * (p.t - 2.25)
-            };
+            let expected = if p.t < 2.0 { 2.0 * (p.t - 1.0) } else { 1.5 + 2.5 + 2.0 * (p.t - 2.25) };
             assert!((p.view - expected).abs() < 1e-9);
             length += 1.0 / p.density;
         }

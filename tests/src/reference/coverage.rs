@@ -35,10 +35,7 @@ pub fn coverage(
     };
     let all: Vec<usize> = (0..width * height).collect();
     let mut cover = pass(&all, COARSE);
-    let edge: Vec<usize> = all
-        .into_iter()
-        .filter(|&i| !is_flat(&cover, width, height, i))
-        .collect();
+    let edge: Vec<usize> = all.into_iter().filter(|&i| !is_flat(&cover, width, height, i)).collect();
     let fine = pass(&edge, FINE);
     let rays = width * height * COARSE * COARSE + edge.len() * FINE * FINE;
     for (&i, value) in edge.iter().zip(fine) {

@@ -28,18 +28,10 @@ impl<'a> Field<'a> {
     /// Looks through the field once.
     pub fn new(density: &'a Density) -> Self {
         let Density::Grid(grid) = density else {
-            return Self {
-                density,
-                bends: Default::default(),
-                linear: false,
-            };
+            return Self { density, bends: Default::default(), linear: false };
         };
         let bends = std::array::from_fn(|axis| bends(grid, axis));
-        Self {
-            density,
-            bends,
-            linear: grid.size().iter().filter(|n| **n > 1).count() <= 1,
-        }
+        Self { density, bends, linear: grid.size().iter().filter(|n| **n > 1).count() <= 1 }
     }
 
     /// The field itself.
@@ -62,12 +54,7 @@ impl<'a> Field<'a> {
             Density::Uniform(_) => {}
             Density::Layers(layers) => {
                 let part = layers.period / layers.densities.len() as f64;
-                planes(
-                    origin.dot(layers.axis) / part,
-                    direction.dot(layers.axis) / part,
-                    (start, end),
-                    cuts,
-                );
+                planes(origin.dot(layers.axis) / part, direction.dot(layers.axis) / part, (start, end), cuts);
             }
             Density::Grid(grid) => self.cut_grid(grid, origin, direction, (start, end), cuts),
             Density::Noise(noise) => {
@@ -93,10 +80,7 @@ impl<'a> Field<'a> {
         let (low, high) = grid.bounds();
         for (axis, bends) in self.bends.iter().enumerate() {
             let per_voxel = grid.size()[axis] as f64 / (high[axis] - low[axis]);
-            let (offset, slope) = (
-                (origin[axis] - low[axis]) * per_voxel - 0.5,
-                direction[axis] * per_voxel,
-            );
+            let (offset, slope) = ((origin[axis] - low[axis]) * per_voxel - 0.5, direction[axis] * per_voxel);
             let (a, b) = (offset + slope * start, offset + slope * end);
             let first = bends.partition_point(|n| *n < a.min(b));
             let passed = bends[first..].iter().take_while(|n| **n <= a.max(b));
@@ -129,9 +113,7 @@ impl<'a> Field<'a> {
             return rho * (end - start);
         }
         self.cut(origin, direction, (start, end), cuts, crossings);
-        cuts.windows(2)
-            .map(|w| self.smooth_part(origin, direction, w[0], w[1]))
-            .sum()
+        cuts.windows(2).map(|w| self.smooth_part(origin, direction, w[0], w[1])).sum()
     }
 }
 
@@ -188,23 +170,14 @@ fn cut_shapes(
             }
             Solid::Box { min, max } => {
                 for k in (0..3).filter(|&k| direction[k] != 0.0) {
-                    cuts.extend([
-                        (min[k] - origin[k]) / direction[k],
-                        (max[k] - origin[k]) / direction[k],
-                    ]);
+                    cuts.extend([(min[k] - origin[k]) / direction[k], (max[k] - origin[k]) / direction[k]]);
                 }
             }
-            Solid::Torus {
-                center,
-                axis,
-                radius,
-                tube,
-            } => {
+            Solid::Torus { center, axis, radius, tube } => {
                 cut_torus(origin - *center, direction, *axis, *radius, *tube, cuts);
             }
             Solid::Mesh(mesh) => {
-                mesh.1
-                    .crossings(origin, direction, f64::NEG_INFINITY, f64::INFINITY, crossings);
+                mesh.1.crossings(origin, direction, f64::NEG_INFINITY, f64::INFINITY, crossings);
                 cuts.extend(crossings.iter().map(|c| c.t));
             }
         }
@@ -243,12 +216,7 @@ mod tests {
 
     fn check(field: &Density, tolerance: f64) {
         let origin = DVec3::new(-0.91, -0.13, 0.27);
-        for direction in [
-            DVec3::X,
-            DVec3::new(0.48, -0.6, 0.64),
-            DVec3::new(0.8, 0.0, -0.6),
-            DVec3::Y,
-        ] {
+        for direction in [DVec3::X, DVec3::new(0.48, -0.6, 0.64), DVec3::new(0.8, 0.0, -0.6), DVec3::Y] {
             let n = 1_000_000;
             let h = 1.7 / f64::from(n);
             let middle = |i: u32| origin + direction * (0.1 + (f64::from(i) + 0.5) * h);
@@ -263,64 +231,28 @@ mod tests {
     fn layers() {
         let axis = DVec3::new(0.6, 0.8, 0.0);
         // Each of about 20 jumps of at most 2.8 is misplaced by at most half a step of 1.7e-6 in the sum.
-        check(
-            &Density::Layers(Layers {
-                axis,
-                period: 0.25,
-                densities: vec![1.0, 0.2, 3.0],
-            }),
-            5e-5,
-        );
+        check(&Density::Layers(Layers { axis, period: 0.25, densities: vec![1.0, 0.2, 3.0] }), 5e-5);
     }
 
     #[test]
     fn grids() {
         let values = |n: usize| (0..n).map(|i| ((i * 7 + i / 5) % 11) as f32).collect();
         let (low, high) = (DVec3::splat(-1.0), DVec3::new(0.5, 1.0, 0.8));
-        check(
-            &Density::Grid(Grid::new([5, 6, 7], low, high, values(210)).unwrap()),
-            1e-6,
-        );
-        check(
-            &Density::Grid(Grid::new([1, 16, 1], low, high, values(16)).unwrap()),
-            1e-6,
-        );
+        check(&Density::Grid(Grid::new([5, 6, 7], low, high, values(210)).unwrap()), 1e-6);
+        check(&Density::Grid(Grid::new([1, 16, 1], low, high, values(16)).unwrap()), 1e-6);
         let steps = (0..24).map(|i| if i / 4 % 2 == 0 { 3.0 } else { 18.0 }).collect();
-        check(
-            &Density::Grid(Grid::new([1, 1, 24], low, high, steps).unwrap()),
-            1e-6,
-        );
+        check(&Density::Grid(Grid::new([1, 1, 24], low, high, steps).unwrap()), 1e-6);
     }
 
     #[test]
     fn solids() {
-        let solid = |solid, density| Shape {
-            solid,
-            density,
-            absorb: false,
-        };
-        let ring = Solid::Torus {
-            center: DVec3::new(0.1, 0.0, 0.2),
-            axis: DVec3::Y,
-            radius: 0.5,
-            tube: 0.15,
-        };
+        let solid = |solid, density| Shape { solid, density, absorb: false };
+        let ring =
+            Solid::Torus { center: DVec3::new(0.1, 0.0, 0.2), axis: DVec3::Y, radius: 0.5, tube: 0.15 };
         let shapes = vec![
             solid(ring, 40.0),
-            solid(
-                Solid::Sphere {
-                    center: DVec3::ZERO,
-                    radius: 0.4,
-                },
-                2.0,
-            ),
-            solid(
-                Solid::Box {
-                    min: DVec3::splat(-0.3),
-                    max: DVec3::splat(0.1),
-                },
-                7.0,
-            ),
+            solid(Solid::Sphere { center: DVec3::ZERO, radius: 0.4 }, 2.0),
+            solid(Solid::Box { min: DVec3::splat(-0.3), max: DVec3::splat(0.1) }, 7.0),
         ];
         // Up to 10 jumps of at most 40 times half a step.
         check(&Density::Shapes(Shapes { base: 0.2, shapes }), 4e-4);
@@ -329,14 +261,6 @@ mod tests {
     #[test]
     fn noise() {
         // Kinks in the second derivative at cell faces limit the two-point rule; 2e-4 of a mean of about 1.
-        check(
-            &Density::Noise(Noise {
-                seed: 1,
-                frequency: 3.0,
-                octaves: 4,
-                range: [0.2, 1.8],
-            }),
-            2e-4,
-        );
+        check(&Density::Noise(Noise { seed: 1, frequency: 3.0, octaves: 4, range: [0.2, 1.8] }), 2e-4);
     }
 }

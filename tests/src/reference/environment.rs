@@ -27,10 +27,8 @@ impl Sky {
     pub fn new(environment: &Environment) -> Option<Self> {
         let (width, height) = (environment.picture.width, environment.picture.height);
         let pixels = &environment.picture.pixels;
-        let radiance: Vec<DVec3> = pixels
-            .iter()
-            .map(|p| DVec3::from_array(p.map(f64::from)) * environment.scale)
-            .collect();
+        let radiance: Vec<DVec3> =
+            pixels.iter().map(|p| DVec3::from_array(p.map(f64::from)) * environment.scale).collect();
         let (mut rows, mut columns) = (vec![0.0], Vec::with_capacity((width + 1) * height));
         for (j, row) in radiance.chunks(width).enumerate() {
             let mut sum = 0.0;
@@ -49,13 +47,7 @@ impl Sky {
         let total = rows[height];
         (total > 0.0).then(|| {
             rows.iter_mut().for_each(|r| *r /= total);
-            Self {
-                width,
-                height,
-                radiance,
-                rows,
-                columns,
-            }
+            Self { width, height, radiance, rows, columns }
         })
     }
 
@@ -133,12 +125,6 @@ mod tests {
 
     #[test]
     fn black_skies_are_none() {
-        assert!(
-            Sky::new(&Environment {
-                picture: Picture::new(4, 2),
-                scale: 1.0
-            })
-            .is_none()
-        );
+        assert!(Sky::new(&Environment { picture: Picture::new(4, 2), scale: 1.0 }).is_none());
     }
 }

@@ -68,14 +68,7 @@ impl<'a> Integrator<'a> {
     pub fn hits(&self, x: f64, y: f64, worker: &mut Worker) -> bool {
         let direction = self.frame.direction(x, y, self.size[0], self.size[1]);
         worker.rays += 1;
-        trace(
-            self.accel,
-            1.0,
-            self.frame.origin,
-            direction,
-            f64::INFINITY,
-            &mut worker.view,
-        );
+        trace(self.accel, 1.0, self.frame.origin, direction, f64::INFINITY, &mut worker.view);
         !worker.view.stretches.is_empty()
     }
 
@@ -85,14 +78,7 @@ impl<'a> Integrator<'a> {
         let origin = self.frame.origin;
         let direction = self.frame.direction(x, y, self.size[0], self.size[1]);
         worker.rays += 1;
-        trace(
-            self.accel,
-            self.medium.ior(),
-            origin,
-            direction,
-            f64::INFINITY,
-            &mut worker.view,
-        );
+        trace(self.accel, self.medium.ior(), origin, direction, f64::INFINITY, &mut worker.view);
         if worker.view.stretches.is_empty() {
             return DVec3::ZERO;
         }
@@ -101,22 +87,9 @@ impl<'a> Integrator<'a> {
             let rho = self.medium.uniform_density();
             along::in_homogeneous(kappa, rho, &worker.view.stretches, p[2])
         } else {
-            along::in_field(
-                (kappa, &self.field),
-                origin,
-                direction,
-                &worker.view,
-                &mut worker.march,
-                p[2],
-            )
+            along::in_field((kappa, &self.field), origin, direction, &worker.view, &mut worker.march, p[2])
         };
-        let Some(Position {
-            t,
-            density,
-            view,
-            boundary,
-        }) = found
-        else {
+        let Some(Position { t, density, view, boundary }) = found else {
             return DVec3::ZERO;
         };
         let at = origin + direction * t;
@@ -150,24 +123,13 @@ impl<'a> Integrator<'a> {
             return DVec3::ZERO;
         }
         worker.rays += 1;
-        trace(
-            self.accel,
-            self.medium.ior(),
-            at,
-            towards,
-            distance,
-            &mut worker.shadow,
-        );
+        trace(self.accel, self.medium.ior(), at, towards, distance, &mut worker.shadow);
         let mut depth = 0.0;
         for s in &worker.shadow.stretches {
             let memory = (&mut worker.march.cuts, &mut worker.march.crossings);
             depth += self.field.length(at, towards, s.start, s.end, memory);
         }
-        let boundary = worker
-            .shadow
-            .stretches
-            .last()
-            .map_or(1.0, |s| s.reached * s.leaving);
+        let boundary = worker.shadow.stretches.last().map_or(1.0, |s| s.reached * s.leaving);
         // Light travels along -towards, the camera lies along -view.
         let phase = self.medium.phase().value(towards.dot(view));
         irradiance * (-self.medium.extinction() * depth).exp() * (phase * boundary)

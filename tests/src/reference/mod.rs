@@ -54,11 +54,7 @@ pub struct Settings {
 
 impl Default for Settings {
     fn default() -> Self {
-        Self {
-            tolerance: 0.005,
-            seed: 0,
-            most_samples: 1 << 16,
-        }
+        Self { tolerance: 0.005, seed: 0, most_samples: 1 << 16 }
     }
 }
 
@@ -103,11 +99,8 @@ impl Pixel {
     /// Variance of the mean, summed over channels.
     fn variance(&self) -> f64 {
         let mean = self.mean();
-        let scatter: f64 = self
-            .sums
-            .iter()
-            .map(|s| (*s / f64::from(self.samples) - mean).length_squared())
-            .sum();
+        let scatter: f64 =
+            self.sums.iter().map(|s| (*s / f64::from(self.samples) - mean).length_squared()).sum();
         scatter / (REPLICATES * (REPLICATES - 1)) as f64
     }
 }
@@ -124,10 +117,7 @@ pub fn render(
     progress: &(dyn Fn(Progress) + Sync),
 ) -> Result<Reference> {
     if !(settings.tolerance > 0.0 && settings.tolerance.is_finite()) {
-        return Err(Error::invalid(format!(
-            "the tolerance must be above 0, not {}",
-            settings.tolerance
-        )));
+        return Err(Error::invalid(format!("the tolerance must be above 0, not {}", settings.tolerance)));
     }
     let accel = Accel::new(mesh);
     let integrator = Integrator::new(mesh, &accel, medium, scene)?;
@@ -136,28 +126,15 @@ pub fn render(
         let done = AtomicUsize::new(0);
         move |count: usize| {
             let done = done.fetch_add(count, Ordering::Relaxed) + count;
-            progress(Progress {
-                pass,
-                done: done.min(total),
-                total,
-                error,
-            });
+            progress(Progress { pass, done: done.min(total), total, error });
         }
     };
-    let (cover, mut rays) = coverage::coverage(
-        &integrator,
-        width,
-        height,
-        &report(0, width * height, f64::INFINITY),
-    );
+    let (cover, mut rays) =
+        coverage::coverage(&integrator, width, height, &report(0, width * height, f64::INFINITY));
     let empty = |i: usize| cover[i] == 0.0 && is_flat(&cover, width, height, i);
     let mut pixels: Vec<Pixel> = (0..width * height)
         .filter(|&i| integrator.is_lit() && !empty(i))
-        .map(|index| Pixel {
-            index,
-            sums: [DVec3::ZERO; REPLICATES],
-            samples: 0,
-        })
+        .map(|index| Pixel { index, sums: [DVec3::ZERO; REPLICATES], samples: 0 })
         .collect();
     let mut active = vec![true; pixels.len()];
     let mut error = f64::INFINITY;
@@ -165,14 +142,7 @@ pub fn render(
     let converged = loop {
         pass += 1;
         let count = active.iter().filter(|a| **a).count();
-        rays += refine(
-            &integrator,
-            width,
-            settings,
-            &mut pixels,
-            &active,
-            &report(pass, count, error),
-        );
+        rays += refine(&integrator, width, settings, &mut pixels, &active, &report(pass, count, error));
         error = relative_error(&pixels);
         if error <= settings.tolerance {
             break true;
@@ -187,12 +157,7 @@ pub fn render(
         picture.pixels[p.index] = p.mean().as_vec3().to_array();
     }
     picture.coverage = Some(cover);
-    Ok(Reference {
-        picture,
-        error,
-        converged,
-        rays,
-    })
+    Ok(Reference { picture, error, converged, rays })
 }
 
 /// Doubles the samples of the active pixels (or takes the first ones) and returns the number of rays.
@@ -205,12 +170,7 @@ fn refine(
     done: &(dyn Fn(usize) + Sync),
 ) -> u64 {
     let rays = AtomicU64::new(0);
-    let work: Vec<&mut Pixel> = pixels
-        .iter_mut()
-        .zip(active)
-        .filter(|(_, a)| **a)
-        .map(|(p, _)| p)
-        .collect();
+    let work: Vec<&mut Pixel> = pixels.iter_mut().zip(active).filter(|(_, a)| **a).map(|(p, _)| p).collect();
     work.into_par_iter().chunks(64).for_each(|chunk| {
         let mut worker = Worker::default();
         let count = chunk.len();
@@ -233,9 +193,8 @@ fn refine(
 
 /// √(Σ variance of the mean / Σ mean²); 0 for a black picture.
 fn relative_error(pixels: &[Pixel]) -> f64 {
-    let (noise, power) = pixels.iter().fold((0.0, 0.0), |(v, m), p| {
-        (v + p.variance(), m + p.mean().length_squared())
-    });
+    let (noise, power) =
+        pixels.iter().fold((0.0, 0.0), |(v, m), p| (v + p.variance(), m + p.mean().length_squared()));
     if noise == 0.0 { 0.0 } else { (noise / power).sqrt() }
 }
 
@@ -254,10 +213,7 @@ fn choose(pixels: &[Pixel], settings: &Settings, width: usize, height: usize) ->
         variance[i].max(sum / n)
     };
     let most = settings.most_samples / REPLICATES as u32;
-    pixels
-        .iter()
-        .map(|p| 2 * p.samples <= most && smooth(p.index) > 0.25 * share)
-        .collect()
+    pixels.iter().map(|p| 2 * p.samples <= most && smooth(p.index) > 0.25 * share).collect()
 }
 
 #[cfg(test)]

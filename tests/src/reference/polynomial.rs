@@ -40,11 +40,7 @@ fn isolate(c: &[f64], out: &mut [f64; 4]) -> usize {
 fn bisect(mut low: f64, mut high: f64, stays: impl Fn(f64) -> bool) -> f64 {
     for _ in 0..60 {
         let middle = 0.5 * (low + high);
-        if stays(middle) {
-            low = middle
-        } else {
-            high = middle
-        }
+        if stays(middle) { low = middle } else { high = middle }
     }
     0.5 * (low + high)
 }

@@ -37,11 +37,7 @@ pub fn trace(accel: &Accel, ior: f64, origin: DVec3, direction: DVec3, limit: f6
     crossings.sort_unstable_by(|a, b| a.t.total_cmp(&b.t).then(b.sign.cmp(&a.sign)));
     let mut winding: i32 = crossings.iter().map(|c| c.sign).sum();
     let through = |c: &Crossing| {
-        if ior == 1.0 {
-            1.0
-        } else {
-            fresnel::transmittance(direction.dot(accel.normal(c.triangle)), ior)
-        }
+        if ior == 1.0 { 1.0 } else { fresnel::transmittance(direction.dot(accel.normal(c.triangle)), ior) }
     };
     let mut reached = 1.0;
     let mut open = (winding > 0).then_some(0.0);
@@ -58,12 +54,7 @@ pub fn trace(accel: &Accel, ior: f64, origin: DVec3, direction: DVec3, limit: f6
             Some(start) if winding <= 0 => {
                 let leaving = through(c);
                 if c.t > start {
-                    stretches.push(Stretch {
-                        start,
-                        end: c.t,
-                        reached,
-                        leaving,
-                    });
+                    stretches.push(Stretch { start, end: c.t, reached, leaving });
                 }
                 reached *= leaving;
                 open = None;
@@ -75,12 +66,7 @@ pub fn trace(accel: &Accel, ior: f64, origin: DVec3, direction: DVec3, limit: f6
         && limit.is_finite()
         && limit > start
     {
-        stretches.push(Stretch {
-            start,
-            end: limit,
-            reached,
-            leaving: 1.0,
-        });
+        stretches.push(Stretch { start, end: limit, reached, leaving: 1.0 });
     }
 }
 
@@ -102,14 +88,9 @@ mod tests {
                     pick(2, low.z, high.z),
                 ));
             }
-            for [a, b, c, d] in [
-                [0, 4, 6, 2],
-                [1, 3, 7, 5],
-                [0, 1, 5, 4],
-                [2, 6, 7, 3],
-                [0, 2, 3, 1],
-                [4, 5, 7, 6],
-            ] {
+            for [a, b, c, d] in
+                [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]]
+            {
                 triangles.extend([[a, b, c], [a, c, d]].map(|t: [u32; 3]| t.map(|i| i + base)));
             }
         }
@@ -136,26 +117,11 @@ mod tests {
                 assert!((g.0 - w.0).abs() < 1e-12 && (g.1 - w.1).abs() < 1e-12, "{got:?}");
             }
         };
-        near(
-            ends(stretches(&accel, 1.0, off - DVec3::X, f64::INFINITY)),
-            &[(1.0, 2.0), (3.0, 5.0)],
-        );
-        near(
-            ends(stretches(&accel, 1.0, off + DVec3::X * 0.5, f64::INFINITY)),
-            &[(0.0, 0.5), (1.5, 3.5)],
-        );
-        near(
-            ends(stretches(&accel, 1.0, off + DVec3::X * 0.5, 2.5)),
-            &[(0.0, 0.5), (1.5, 2.5)],
-        );
-        near(
-            ends(stretches(&accel, 1.0, off + DVec3::X * 0.5, 1.0)),
-            &[(0.0, 0.5)],
-        );
-        near(
-            ends(stretches(&accel, 1.0, off + DVec3::X * 5.0, f64::INFINITY)),
-            &[],
-        );
+        near(ends(stretches(&accel, 1.0, off - DVec3::X, f64::INFINITY)), &[(1.0, 2.0), (3.0, 5.0)]);
+        near(ends(stretches(&accel, 1.0, off + DVec3::X * 0.5, f64::INFINITY)), &[(0.0, 0.5), (1.5, 3.5)]);
+        near(ends(stretches(&accel, 1.0, off + DVec3::X * 0.5, 2.5)), &[(0.0, 0.5), (1.5, 2.5)]);
+        near(ends(stretches(&accel, 1.0, off + DVec3::X * 0.5, 1.0)), &[(0.0, 0.5)]);
+        near(ends(stretches(&accel, 1.0, off + DVec3::X * 5.0, f64::INFINITY)), &[]);
     }
 
     #[test]

@@ -23,9 +23,7 @@ impl Sequence {
     /// The copy that belongs to `item`, whatever is evaluated before or beside it.
     pub fn new(seed: u64, item: u64) -> Self {
         let own = hash(seed, item);
-        Self {
-            shift: std::array::from_fn(|k| (hash(own, k as u64) >> 32) as u32),
-        }
+        Self { shift: std::array::from_fn(|k| (hash(own, k as u64) >> 32) as u32) }
     }
 
     /// Point `index`, each coordinate strictly within 0..1.
@@ -52,11 +50,7 @@ mod tests {
                 assert!(values.iter().all(|x| *x > 0.0 && *x < 1.0));
                 values.sort_by(f64::total_cmp);
                 // Unfolded, the points are 1/n apart; the fold lays two such rows over each other.
-                assert!(
-                    values
-                        .windows(3)
-                        .all(|w| w[2] - w[0] <= 2.0 / f64::from(n) + 1e-6)
-                );
+                assert!(values.windows(3).all(|w| w[2] - w[0] <= 2.0 / f64::from(n) + 1e-6));
             }
         }
     }

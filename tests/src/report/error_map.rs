@@ -38,20 +38,11 @@ impl ErrorMap {
         };
         let inside: Vec<usize> = (0..reference.pixels.len()).filter(|&i| covered(i)).collect();
         let mean = |p: [f32; 3]| p.iter().map(|v| f64::from(*v)).sum::<f64>() / 3.0;
-        let square: f64 = inside
-            .iter()
-            .flat_map(|&i| reference.pixels[i])
-            .map(|v| f64::from(v).powi(2))
-            .sum();
-        let rms = (square / (3 * inside.len().max(1)) as f64)
-            .sqrt()
-            .max(f64::MIN_POSITIVE);
+        let square: f64 =
+            inside.iter().flat_map(|&i| reference.pixels[i]).map(|v| f64::from(v).powi(2)).sum();
+        let rms = (square / (3 * inside.len().max(1)) as f64).sqrt().max(f64::MIN_POSITIVE);
         let error = |i: usize| (mean(image.pixels[i]) - mean(reference.pixels[i])) / rms;
-        let mut sizes: Vec<f64> = inside
-            .iter()
-            .map(|&i| error(i).abs())
-            .filter(|e| e.is_finite())
-            .collect();
+        let mut sizes: Vec<f64> = inside.iter().map(|&i| error(i).abs()).filter(|e| e.is_finite()).collect();
         let scale = nice_above(percentile(&mut sizes, 99.0));
         let zoom = LEAST_HEIGHT.div_ceil(reference.height).max(1);
         let label_width = 7 * (font::SIZE[0] + 1) * DOT;
@@ -111,20 +102,13 @@ fn label(percent: f64) -> String {
     if percent == 0.0 {
         return "0%".to_owned();
     }
-    if percent.fract() == 0.0 {
-        format!("{percent:+.0}%")
-    } else {
-        format!("{percent:+}%")
-    }
+    if percent.fract() == 0.0 { format!("{percent:+.0}%") } else { format!("{percent:+}%") }
 }
 
 /// The smallest of ..., 0.01, 0.02, 0.05, 0.1, ... that is not below `x`, from 0.001 to 1000.
 fn nice_above(x: f64) -> f64 {
     let steps = (-3..=3).flat_map(|e| [1.0, 2.0, 5.0].map(|m| m * 10f64.powi(e)));
-    steps
-        .into_iter()
-        .find(|s| *s >= x * (1.0 - 1e-9))
-        .unwrap_or(1000.0)
+    steps.into_iter().find(|s| *s >= x * (1.0 - 1e-9)).unwrap_or(1000.0)
 }
 
 /// Blue through white to red for -1..1; magenta for a value that is no number.

@@ -88,13 +88,7 @@ impl Case {
 }
 
 /// Names of the files that [`write_pictures`] makes.
-pub const PICTURES: [&str; 5] = [
-    "played.exr",
-    "played.png",
-    "reference.exr",
-    "reference.png",
-    "error.png",
-];
+pub const PICTURES: [&str; 5] = ["played.exr", "played.png", "reference.exr", "reference.png", "error.png"];
 
 /// Writes both pictures (EXR, and PNG at the same exposure) and the error map to `folder`; returns their paths.
 ///

@@ -75,32 +75,18 @@ fn section(html: &mut String, case: &Case) -> Result<()> {
     }
     html.push_str("<table>\n");
     let mut row = |name: &str, value: &str| {
-        let _ = writeln!(
-            html,
-            "<tr><th>{}</th><td>{}</td></tr>",
-            escape(name),
-            escape(value)
-        );
+        let _ = writeln!(html, "<tr><th>{}</th><td>{}</td></tr>", escape(name), escape(value));
     };
     row("relative RMSE", &format!("{:.3} %", 100.0 * m.rel_rmse));
     row("PSNR", &format!("{:.2} dB", m.psnr_db));
     row("bias", &format!("{:+.3} %", 100.0 * m.bias));
-    row(
-        "99th percentile of the relative error",
-        &format!("{:.2} %", 100.0 * m.p99_rel),
-    );
+    row("99th percentile of the relative error", &format!("{:.2} %", 100.0 * m.p99_rel));
     row("values that are not finite", &m.non_finite.to_string());
     row("pixels compared", &m.pixels.to_string());
-    row(
-        "noise of the reference",
-        &format!("{:.2} %", 100.0 * case.reference.error),
-    );
+    row("noise of the reference", &format!("{:.2} %", 100.0 * case.reference.error));
     row(
         "frame",
-        &format!(
-            "{:.1} ms on {} ({})",
-            case.played.frame_ms, case.played.backend, case.played.adapter
-        ),
+        &format!("{:.1} ms on {} ({})", case.played.frame_ms, case.played.backend, case.played.adapter),
     );
     row("kernels on a ray", &format!("{:.1}", case.played.splats_per_ray));
     for (name, value) in &case.facts {
@@ -120,8 +106,5 @@ fn png(picture: &Picture, display: Display) -> Result<Vec<u8>> {
 
 /// Text that is safe between tags and in attributes.
 fn escape(text: &str) -> String {
-    text.replace('&', "&amp;")
-        .replace('<', "&lt;")
-        .replace('>', "&gt;")
-        .replace('"', "&quot;")
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }

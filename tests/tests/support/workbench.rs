@@ -33,21 +33,14 @@ pub fn small_asset(medium: &Medium, samples: usize) -> Asset {
         mesh_name: "ball.obj".to_owned(),
         material_name: "m.toml".to_owned(),
     };
-    let params = Params {
-        samples,
-        directions: 32,
-        order: 3,
-        ..Params::default()
-    };
+    let params = Params { samples, directions: 32, order: 3, ..Params::default() };
     bake(&input, &params, &Silent).unwrap().0
 }
 
 impl Workbench {
     /// Writes ball.obj, m.toml, s.toml and ball.dph.
     pub fn new() -> Self {
-        let bench = Self {
-            folder: tempfile::tempdir().unwrap(),
-        };
+        let bench = Self { folder: tempfile::tempdir().unwrap() };
         bench.write("ball.obj", diaphane_assets::shapes::icosphere(1.0, 2).to_obj());
         bench.write("m.toml", MATERIAL);
         bench.write("s.toml", SCENE);
@@ -73,13 +66,7 @@ impl Workbench {
             println!("skipped: {name} is not built; test with --workspace");
             return None;
         }
-        Some(
-            Command::new(path)
-                .current_dir(self.folder.path())
-                .args(arguments)
-                .output()
-                .unwrap(),
-        )
+        Some(Command::new(path).current_dir(self.folder.path()).args(arguments).output().unwrap())
     }
 
     /// Every file below the folder with its bytes.

@@ -44,9 +44,7 @@ pub fn run(args: &Args, output: &Path) -> Result<()> {
         stats.add(started.elapsed().as_secs_f64() * 1e3, &frame);
         rendered = Some(frame);
     }
-    let Some(rendered) = rendered else {
-        bail!("--frames must be at least 1")
-    };
+    let Some(rendered) = rendered else { bail!("--frames must be at least 1") };
     write(output, &rendered.picture, format)?;
     if let Some(path) = &args.stats {
         stats.write(path)?;
@@ -55,18 +53,11 @@ pub fn run(args: &Args, output: &Path) -> Result<()> {
 }
 
 fn format_of(output: &Path) -> Result<Format> {
-    let extension = output
-        .extension()
-        .and_then(|e| e.to_str())
-        .unwrap_or_default()
-        .to_ascii_lowercase();
+    let extension = output.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
     match extension.as_str() {
         "exr" => Ok(Format::Exr),
         "png" => Ok(Format::Png),
-        _ => bail!(
-            "'{}': the picture's name must end in .exr or .png",
-            output.display()
-        ),
+        _ => bail!("'{}': the picture's name must end in .exr or .png", output.display()),
     }
 }
 
@@ -82,10 +73,7 @@ fn check_paths(args: &Args, output: &Path) -> Result<()> {
             require_different(stats, input)?;
         }
         if stats == output {
-            bail!(
-                "'{}': picture and statistics need different files",
-                output.display()
-            );
+            bail!("'{}': picture and statistics need different files", output.display());
         }
         require_writable(stats)?;
     }

@@ -9,20 +9,28 @@ mod window;
 use anyhow::Result;
 use args::Args;
 use clap::Parser;
+use diaphane_formats::one_line;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
     env_logger::Builder::from_env(env_logger::Env::default().default_filter_or("error")).init();
-    let args = Args::parse();
-    let done = match &args.output {
-        Some(output) => headless::run(&args, output),
-        None => open_window(&args),
+    let done = match Args::try_parse() {
+        Err(e) if !e.use_stderr() => {
+            // Help and version were asked for.
+            let _ = e.print();
+            return ExitCode::SUCCESS;
+        }
+        Err(e) => Err(anyhow::anyhow!("{} (see --help)", one_line(&e.to_string()))),
+        Ok(args) => match &args.output {
+            Some(output) => headless::run(&args, output),
+            None => open_window(&args),
+        },
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            // One line, whatever a message quotes.
-            eprintln!("error: {}", error.to_string().replace(['\n', '\r'], " "));
+            let line = one_line(&format!("{error:#}"));
+            eprintln!("error: {}", line.strip_prefix("error: ").unwrap_or(&line));
             ExitCode::from(2)
         }
     }

@@ -51,11 +51,7 @@ impl Spread {
         sorted.sort_unstable_by(f64::total_cmp);
         let at = |i: usize| sorted.get(i).copied().unwrap_or_default();
         let (low, high) = (at(sorted.len().saturating_sub(1) / 2), at(sorted.len() / 2));
-        Self {
-            min: at(0),
-            median: 0.5 * (low + high),
-            max: at(sorted.len().saturating_sub(1)),
-        }
+        Self { min: at(0), median: 0.5 * (low + high), max: at(sorted.len().saturating_sub(1)) }
     }
 }
 
@@ -97,11 +93,7 @@ impl Stats {
     /// Writes everything to `path`.
     pub fn write(mut self, path: &Path) -> Result<()> {
         self.frame_ms = Spread::of(&self.frame_times);
-        self.pass_ms = self
-            .pass_times
-            .iter()
-            .map(|(name, times)| (*name, Spread::of(times)))
-            .collect();
+        self.pass_ms = self.pass_times.iter().map(|(name, times)| (*name, Spread::of(times))).collect();
         let mut json = serde_json::to_string_pretty(&self)?;
         json.push('\n');
         Ok(files::write_atomically(path, json.as_bytes())?)

@@ -42,12 +42,7 @@ impl Boundary {
             &frame.lights,
             &targets.boundary,
         ];
-        group(
-            device,
-            "boundary",
-            &self.layout,
-            resources.map(|b| b.as_entire_binding()).into(),
-        )
+        group(device, "boundary", &self.layout, resources.map(|b| b.as_entire_binding()).into())
     }
 
     pub fn record(&self, r: &mut Recorder, group: &BindGroup, asset: &AssetBuffers, targets: &Targets) {

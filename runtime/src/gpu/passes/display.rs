@@ -28,12 +28,7 @@ pub(crate) struct Display {
 
 impl Display {
     pub fn new(device: &Device, target: TextureFormat) -> Self {
-        let layout = layout(
-            device,
-            "display",
-            ShaderStages::FRAGMENT,
-            &[Slot::Uniform, Slot::Texture],
-        );
+        let layout = layout(device, "display", ShaderStages::FRAGMENT, &[Slot::Uniform, Slot::Texture]);
         let pipeline_layout = device.create_pipeline_layout(&PipelineLayoutDescriptor {
             label: Some("display"),
             bind_group_layouts: &[Some(&layout)],
@@ -62,34 +57,17 @@ impl Display {
             cache: None,
         });
         let size = size_of::<DisplayUniform>() as u64;
-        let uniform = empty_buffer(
-            device,
-            "display",
-            size,
-            BufferUsages::UNIFORM | BufferUsages::COPY_DST,
-        );
-        Self {
-            layout,
-            pipeline,
-            uniform,
-            encode: !target.is_srgb(),
-        }
+        let uniform = empty_buffer(device, "display", size, BufferUsages::UNIFORM | BufferUsages::COPY_DST);
+        Self { layout, pipeline, uniform, encode: !target.is_srgb() }
     }
 
     pub fn bind(&self, device: &Device, picture: &TextureView) -> BindGroup {
-        let resources = vec![
-            self.uniform.as_entire_binding(),
-            BindingResource::TextureView(picture),
-        ];
+        let resources = vec![self.uniform.as_entire_binding(), BindingResource::TextureView(picture)];
         group(device, "display", &self.layout, resources)
     }
 
     pub fn write(&self, queue: &Queue, exposure: f32) {
-        let uniform = DisplayUniform {
-            exposure,
-            encode: u32::from(self.encode),
-            unused: [0; 2],
-        };
+        let uniform = DisplayUniform { exposure, encode: u32::from(self.encode), unused: [0; 2] };
         queue.write_buffer(&self.uniform, 0, bytemuck::bytes_of(&uniform));
     }
 

@@ -36,12 +36,7 @@ impl Lighting {
             &asset.values,
             &asset.recurrence,
         ];
-        group(
-            device,
-            "lighting",
-            &self.layout,
-            resources.map(|b| b.as_entire_binding()).into(),
-        )
+        group(device, "lighting", &self.layout, resources.map(|b| b.as_entire_binding()).into())
     }
 
     pub fn record(&self, r: &mut Recorder, group: &BindGroup, asset: &AssetBuffers) {

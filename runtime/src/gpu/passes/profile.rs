@@ -16,12 +16,7 @@ pub(crate) struct Profile {
 
 impl Profile {
     pub fn new(device: &Device, common: &BindGroupLayout) -> Self {
-        let layout = layout(
-            device,
-            "profile",
-            ShaderStages::COMPUTE,
-            &[Slot::Read, Slot::Write, Slot::Read],
-        );
+        let layout = layout(device, "profile", ShaderStages::COMPUTE, &[Slot::Read, Slot::Write, Slot::Read]);
         let pipeline_layout = pipeline_layout(device, "profile", common, &layout);
         let module = shaders::module(device, "profile", shaders::PROFILE);
         let pipeline = compute(device, "profile", &pipeline_layout, &module, &[]);
@@ -29,11 +24,8 @@ impl Profile {
     }
 
     pub fn bind(&self, device: &Device, asset: &AssetBuffers, targets: &Targets, piece: usize) -> BindGroup {
-        let resources = vec![
-            targets.piece(piece),
-            targets.profile.as_entire_binding(),
-            asset.grid.as_entire_binding(),
-        ];
+        let resources =
+            vec![targets.piece(piece), targets.profile.as_entire_binding(), asset.grid.as_entire_binding()];
         group(device, "profile", &self.layout, resources)
     }
 

@@ -48,12 +48,7 @@ impl Publish {
 
     pub fn bind(&self, device: &Device, targets: &Targets) -> BindGroup {
         let resources = [&targets.radiance, &targets.counters];
-        group(
-            device,
-            "publish",
-            &self.layout,
-            resources.map(|b| b.as_entire_binding()).into(),
-        )
+        group(device, "publish", &self.layout, resources.map(|b| b.as_entire_binding()).into())
     }
 
     /// Writes the tile's part of `picture`.
@@ -64,10 +59,7 @@ impl Publish {
                 view: picture,
                 depth_slice: None,
                 resolve_target: None,
-                ops: Operations {
-                    load: LoadOp::Load,
-                    store: StoreOp::Store,
-                },
+                ops: Operations { load: LoadOp::Load, store: StoreOp::Store },
             })],
             depth_stencil_attachment: None,
             timestamp_writes: None,

@@ -38,19 +38,12 @@ impl Segments {
             &t.arguments,
             &t.cells,
         ];
-        group(
-            device,
-            "segments",
-            &self.layout,
-            resources.map(|b| b.as_entire_binding()).into(),
-        )
+        group(device, "segments", &self.layout, resources.map(|b| b.as_entire_binding()).into())
     }
 
     pub fn record(&self, r: &mut Recorder, group: &BindGroup, targets: &Targets) {
         r.encoder.clear_buffer(&targets.arguments, 0, None);
         let [x, y] = r.pixel_groups();
-        r.compute(Pass::Segments, &self.pipeline, group, |pass| {
-            pass.dispatch_workgroups(x, y, 1)
-        });
+        r.compute(Pass::Segments, &self.pipeline, group, |pass| pass.dispatch_workgroups(x, y, 1));
     }
 }

@@ -16,12 +16,7 @@ pub(crate) struct Slopes {
 impl Slopes {
     pub fn new(device: &Device, common: &BindGroupLayout) -> Self {
         use Slot::{Read, Write};
-        let layout = layout(
-            device,
-            "slopes",
-            ShaderStages::COMPUTE,
-            &[Read, Read, Read, Read, Write],
-        );
+        let layout = layout(device, "slopes", ShaderStages::COMPUTE, &[Read, Read, Read, Read, Write]);
         let pipeline_layout = pipeline_layout(device, "slopes", common, &layout);
         let module = shaders::module(device, "slopes", shaders::SLOPES);
         let pipeline = compute(device, "slopes", &pipeline_layout, &module, &[]);
@@ -29,19 +24,8 @@ impl Slopes {
     }
 
     pub fn bind(&self, device: &Device, asset: &AssetBuffers) -> BindGroup {
-        let resources = [
-            &asset.samples,
-            &asset.centroids,
-            &asset.spokes,
-            &asset.values,
-            &asset.sources,
-        ];
-        group(
-            device,
-            "slopes",
-            &self.layout,
-            resources.map(|b| b.as_entire_binding()).into(),
-        )
+        let resources = [&asset.samples, &asset.centroids, &asset.spokes, &asset.values, &asset.sources];
+        group(device, "slopes", &self.layout, resources.map(|b| b.as_entire_binding()).into())
     }
 
     pub fn record(&self, r: &mut Recorder, group: &BindGroup, asset: &AssetBuffers) {

@@ -36,10 +36,7 @@ impl Splat {
         ];
         let target = Some(ColorTargetState {
             format: SUM_FORMAT,
-            blend: Some(BlendState {
-                color: ADD,
-                alpha: ADD,
-            }),
+            blend: Some(BlendState { color: ADD, alpha: ADD }),
             write_mask: ColorWrites::ALL,
         });
         let pipeline = device.create_render_pipeline(&RenderPipelineDescriptor {
@@ -51,10 +48,7 @@ impl Splat {
                 compilation_options: options(&constants),
                 buffers: &[],
             },
-            primitive: PrimitiveState {
-                topology: PrimitiveTopology::TriangleStrip,
-                ..Default::default()
-            },
+            primitive: PrimitiveState { topology: PrimitiveTopology::TriangleStrip, ..Default::default() },
             depth_stencil: None,
             multisample: Default::default(),
             fragment: Some(FragmentState {
@@ -102,9 +96,6 @@ fn cleared(view: &TextureView) -> Option<RenderPassColorAttachment<'_>> {
         view,
         depth_slice: None,
         resolve_target: None,
-        ops: Operations {
-            load: LoadOp::Clear(Color::TRANSPARENT),
-            store: StoreOp::Store,
-        },
+        ops: Operations { load: LoadOp::Clear(Color::TRANSPARENT), store: StoreOp::Store },
     })
 }

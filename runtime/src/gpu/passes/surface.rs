@@ -34,18 +34,8 @@ impl Surface {
     }
 
     pub fn bind(&self, device: &Device, asset: &AssetBuffers, targets: &Targets) -> BindGroup {
-        let resources = [
-            &asset.positions,
-            &asset.triangles,
-            &targets.crossings,
-            &asset.neighbours,
-        ];
-        group(
-            device,
-            "surface",
-            &self.layout,
-            resources.map(|b| b.as_entire_binding()).into(),
-        )
+        let resources = [&asset.positions, &asset.triangles, &targets.crossings, &asset.neighbours];
+        group(device, "surface", &self.layout, resources.map(|b| b.as_entire_binding()).into())
     }
 
     pub fn record(&self, r: &mut Recorder, group: &BindGroup, asset: &AssetBuffers, targets: &Targets) {
@@ -110,10 +100,7 @@ pub(super) fn draw_mesh(
             view: &targets.marker,
             depth_slice: None,
             resolve_target: None,
-            ops: Operations {
-                load: LoadOp::Clear(Color::TRANSPARENT),
-                store: StoreOp::Discard,
-            },
+            ops: Operations { load: LoadOp::Clear(Color::TRANSPARENT), store: StoreOp::Discard },
         })],
         depth_stencil_attachment: None,
         timestamp_writes: r.timers.render(pass),
