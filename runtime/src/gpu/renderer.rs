@@ -54,6 +54,8 @@ pub struct Renderer {
     timers: Timers,
     pending: Option<Pending>,
     statistics: Statistics,
+    /// The latest time of each pass.
+    milliseconds: [f64; PASSES],
     tiles: usize,
 }
 
@@ -89,6 +91,7 @@ impl Renderer {
             timers: Timers::new(device, queue, 1),
             pending: None,
             statistics: Statistics::default(),
+            milliseconds: [0.0; PASSES],
             tiles: 0,
             passes,
         })
@@ -232,7 +235,11 @@ impl Renderer {
         {
             let mut milliseconds = [0.0; PASSES];
             reading.sum(&view, &mut milliseconds);
-            self.statistics.passes = Pass::named(&milliseconds);
+            // Passes that run once a picture keep their time while others are drawn again.
+            for (latest, now) in self.milliseconds.iter_mut().zip(milliseconds) {
+                *latest = if now > 0.0 { now } else { *latest };
+            }
+            self.statistics.passes = Pass::named(&self.milliseconds);
         }
     }
 

@@ -1,11 +1,13 @@
 //! The window: looks at an asset under lights that can be moved, through the same passes as the headless player.
 
 mod app;
+mod frames;
 mod orbit;
 mod pace;
 mod panel;
 mod save;
 mod screen;
+mod session;
 
 use crate::args::Args;
 use anyhow::{Context, Result, anyhow};
@@ -14,6 +16,7 @@ use diaphane_formats::files::{require_different, require_writable};
 use diaphane_formats::{asset, scene};
 use diaphane_runtime::framing::default_scene;
 use diaphane_runtime::player::LightMode;
+use session::Session;
 use std::path::PathBuf;
 use winit::event_loop::EventLoop;
 
@@ -50,11 +53,8 @@ pub fn run(args: &Args) -> Result<()> {
         let reason = text.rsplit(": ").next().unwrap_or(&text).trim_end_matches('.');
         anyhow!("no display to open a window on ({reason}); draw a picture with --output instead")
     })?;
-    let title = args
-        .asset
-        .file_name()
-        .map_or_else(String::new, |n| n.to_string_lossy().into_owned());
-    let mut app = App::new(asset, scene, mode, title, errand)?;
+    let title = args.asset.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
+    let mut app = App::new(Session::new(asset, scene, mode)?, title, errand);
     event_loop.run_app(&mut app).context("the window failed")?;
     app.finish()
 }
@@ -69,10 +69,7 @@ fn errand(values: &[String]) -> Result<Errand> {
         frames.ok_or_else(|| anyhow!("--screenshot-after needs a number of frames within 1..100000"))?;
     let file = PathBuf::from(file);
     if !file.extension().is_some_and(|e| e.eq_ignore_ascii_case("png")) {
-        return Err(anyhow!(
-            "'{}': the screenshot's name must end in .png",
-            file.display()
-        ));
+        return Err(anyhow!("'{}': the screenshot's name must end in .png", file.display()));
     }
     Ok(Errand { frames, file })
 }

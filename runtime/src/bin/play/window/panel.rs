@@ -10,7 +10,7 @@ use glam::DVec3;
 pub const WIDTH: f32 = 300.0;
 
 /// What the panel works on.
-pub struct Session<'a> {
+pub struct Contents<'a> {
     pub scene: &'a mut Scene,
     pub fov_degrees: &'a mut f64,
     pub exposure: &'a mut f32,
@@ -46,15 +46,15 @@ pub enum Action {
 }
 
 /// Draws the panel; returns the button that was pressed.
-pub fn show(ui: &mut Ui, session: &mut Session) -> Option<Action> {
+pub fn show(ui: &mut Ui, contents: &mut Contents) -> Option<Action> {
     let mut action = None;
     egui::ScrollArea::vertical().show(ui, |ui| {
         ui.heading("diaphane");
-        statistics(ui, &session.numbers);
+        statistics(ui, &contents.numbers);
         ui.separator();
-        action = picture(ui, session);
+        action = picture(ui, contents);
         ui.separator();
-        lights(ui, session);
+        lights(ui, contents);
     });
     action
 }
@@ -68,89 +68,59 @@ fn statistics(ui: &mut Ui, numbers: &Numbers) {
             ui.monospace(value);
             ui.end_row();
         };
-        row(
-            "frames / s",
-            format!("{:.1}", 1000.0 / numbers.frame_ms.max(1e-3)),
-        );
+        row("frames / s", format!("{:.1}", 1000.0 / numbers.frame_ms.max(1e-3)));
         row("picture", format!("{} x {}", numbers.size[0], numbers.size[1]));
-        row(
-            "rays a pixel",
-            format!("{} of {}", numbers.rays, numbers.rays_wanted),
-        );
-        row(
-            "samples",
-            format!("{} of {}", counters.samples_drawn, numbers.samples),
-        );
+        row("rays a pixel", format!("{} of {}", numbers.rays, numbers.rays_wanted));
+        row("samples", format!("{} of {}", counters.samples_drawn, numbers.samples));
         row("splats a ray", format!("{:.1}", counters.splats_per_ray()));
         if counters.pieces_dropped > 0 {
             row("pieces not drawn", counters.pieces_dropped.to_string());
         }
     });
-    CollapsingHeader::new("Passes, ms a ray")
-        .default_open(true)
-        .show(ui, |ui| {
-            if numbers.statistics.passes.is_empty() {
-                ui.label("this adapter has no clock");
+    CollapsingHeader::new("Passes, ms").default_open(true).show(ui, |ui| {
+        if numbers.statistics.passes.is_empty() {
+            ui.label("this adapter has no clock");
+        }
+        Grid::new("passes").num_columns(2).show(ui, |ui| {
+            for (name, ms) in &numbers.statistics.passes {
+                ui.label(*name);
+                ui.monospace(format!("{ms:8.2}"));
+                ui.end_row();
             }
-            Grid::new("passes").num_columns(2).show(ui, |ui| {
-                for (name, ms) in &numbers.statistics.passes {
-                    ui.label(*name);
-                    ui.monospace(format!("{ms:8.2}"));
-                    ui.end_row();
-                }
-            });
         });
+    });
 }
 
-fn picture(ui: &mut Ui, session: &mut Session) -> Option<Action> {
+fn picture(ui: &mut Ui, contents: &mut Contents) -> Option<Action> {
     let mut action = None;
     ui.horizontal(|ui| {
         // In photographic stops: a factor of two each.
-        let mut stops = session.exposure.max(1e-12).log2();
-        if ui
-            .add(Slider::new(&mut stops, -12.0..=12.0).text("exposure"))
-            .changed()
-        {
-            *session.exposure = stops.exp2();
+        let mut stops = contents.exposure.max(1e-12).log2();
+        if ui.add(Slider::new(&mut stops, -12.0..=12.0).text("exposure")).changed() {
+            *contents.exposure = stops.exp2();
         }
         if ui.button("auto").clicked() {
             action = Some(Action::MeasureExposure);
         }
     });
     ui.horizontal(|ui| {
-        ui.add(
-            Slider::new(session.fov_degrees, 5.0..=120.0)
-                .text("field of view")
-                .suffix("°"),
-        );
-        if ui
-            .button("reset")
-            .on_hover_text("Back to the first camera")
-            .clicked()
-        {
+        ui.add(Slider::new(contents.fov_degrees, 5.0..=120.0).text("field of view").suffix("°"));
+        if ui.button("reset").on_hover_text("Back to the first camera").clicked() {
             action = Some(Action::ResetCamera);
         }
     });
-    if session.refracts {
-        let surface = &mut session.scene.surface;
+    if contents.refracts {
+        let surface = &mut contents.scene.surface;
         ui.checkbox(&mut surface.reflection, "reflection");
-        ui.add_enabled(
-            surface.reflection,
-            Slider::new(&mut surface.specular, 0.0..=2.0).text("strength"),
-        );
-        ui.add_enabled(
-            surface.reflection,
-            Slider::new(&mut surface.roughness, 0.05..=1.0).text("roughness"),
-        );
+        ui.add_enabled(surface.reflection, Slider::new(&mut surface.specular, 0.0..=2.0).text("strength"));
+        ui.add_enabled(surface.reflection, Slider::new(&mut surface.roughness, 0.05..=1.0).text("roughness"));
     }
     ui.horizontal(|ui| {
         ui.label("depth to lights:");
-        for (mode, name) in [
-            (LightMode::Auto, "auto"),
-            (LightMode::Baked, "baked"),
-            (LightMode::Exact, "exact"),
-        ] {
-            ui.selectable_value(session.mode, mode, name);
+        for (mode, name) in
+            [(LightMode::Auto, "auto"), (LightMode::Baked, "baked"), (LightMode::Exact, "exact")]
+        {
+            ui.selectable_value(contents.mode, mode, name);
         }
     });
     ui.horizontal(|ui| {
@@ -161,56 +131,44 @@ fn picture(ui: &mut Ui, session: &mut Session) -> Option<Action> {
             action = Some(Action::SaveExr);
         }
     });
-    ui.label(RichText::new(session.message).small());
+    ui.label(RichText::new(contents.message).small());
     ui.label(RichText::new("drag: turn   right drag: move   wheel: distance").small());
     action
 }
 
-fn lights(ui: &mut Ui, session: &mut Session) {
-    let speed = 0.005 * session.diagonal;
+fn lights(ui: &mut Ui, contents: &mut Contents) {
+    let speed = 0.005 * contents.diagonal;
     let mut gone = None;
-    for (i, light) in session.scene.lights.iter_mut().enumerate() {
+    for (i, light) in contents.scene.lights.iter_mut().enumerate() {
         let title = format!("Light {}: {}", i + 1, kind(light));
-        CollapsingHeader::new(title)
-            .id_salt(("light", i))
-            .default_open(i == 0)
-            .show(ui, |ui| {
-                edit(ui, light, speed);
-                if ui.button("remove").clicked() {
-                    gone = Some(i);
-                }
-            });
+        CollapsingHeader::new(title).id_salt(("light", i)).default_open(i == 0).show(ui, |ui| {
+            edit(ui, light, speed);
+            if ui.button("remove").clicked() {
+                gone = Some(i);
+            }
+        });
     }
     if let Some(i) = gone {
-        session.scene.lights.remove(i);
+        contents.scene.lights.remove(i);
     }
-    if session.scene.environment.is_some() {
+    if contents.scene.environment.is_some() {
         ui.label("and the scene's environment");
     }
     ui.horizontal(|ui| {
         ui.label("add:");
-        let away = session.diagonal;
-        let position = session.centre + DVec3::new(away, away, away);
+        let away = contents.diagonal;
+        let position = contents.centre + DVec3::new(away, away, away);
         let direction = -DVec3::ONE.normalize();
         let intensity = DVec3::splat(4.0 * 3.0 * away * away);
         if ui.button("point").clicked() {
-            session.scene.lights.push(Light::Point { position, intensity });
+            contents.scene.lights.push(Light::Point { position, intensity });
         }
         if ui.button("directional").clicked() {
-            session.scene.lights.push(Light::Directional {
-                direction,
-                irradiance: DVec3::splat(4.0),
-            });
+            contents.scene.lights.push(Light::Directional { direction, irradiance: DVec3::splat(4.0) });
         }
         if ui.button("spot").clicked() {
             let (cos_inner, cos_outer) = (10f64.to_radians().cos(), 15f64.to_radians().cos());
-            session.scene.lights.push(Light::Spot {
-                position,
-                direction,
-                intensity,
-                cos_inner,
-                cos_outer,
-            });
+            contents.scene.lights.push(Light::Spot { position, direction, intensity, cos_inner, cos_outer });
         }
     });
 }
@@ -229,20 +187,11 @@ fn edit(ui: &mut Ui, light: &mut Light, speed: f64) {
             vector(ui, "position", position, speed);
             colour(ui, "intensity", intensity);
         }
-        Light::Directional {
-            direction,
-            irradiance,
-        } => {
+        Light::Directional { direction, irradiance } => {
             heading(ui, direction);
             colour(ui, "irradiance", irradiance);
         }
-        Light::Spot {
-            position,
-            direction,
-            intensity,
-            cos_inner,
-            cos_outer,
-        } => {
+        Light::Spot { position, direction, intensity, cos_inner, cos_outer } => {
             vector(ui, "position", position, speed);
             heading(ui, direction);
             colour(ui, "intensity", intensity);
@@ -279,11 +228,7 @@ fn heading(ui: &mut Ui, direction: &mut DVec3) {
 /// Strength, and colour with its brightest channel at 1.
 fn colour(ui: &mut Ui, name: &str, value: &mut DVec3) {
     let mut strength = value.max_element();
-    let unit = if strength > 0.0 {
-        *value / strength
-    } else {
-        DVec3::ONE
-    };
+    let unit = if strength > 0.0 { *value / strength } else { DVec3::ONE };
     let mut rgb = unit.as_vec3().to_array();
     ui.horizontal(|ui| {
         let a = ui.color_edit_button_rgb(&mut rgb);

@@ -10,9 +10,7 @@ use std::path::{Path, PathBuf};
 /// # Errors
 /// The file cannot be written.
 pub fn save(title: &str, picture: &Picture, exposure: Option<f32>) -> Result<PathBuf> {
-    let stem = Path::new(title)
-        .file_stem()
-        .map_or_else(|| "picture".into(), |s| s.to_string_lossy());
+    let stem = Path::new(title).file_stem().map_or_else(|| "picture".into(), |s| s.to_string_lossy());
     let path = free_name(&stem, if exposure.is_some() { "png" } else { "exr" });
     match exposure {
         Some(exposure) => write_png(&path, picture, Display { exposure })?,

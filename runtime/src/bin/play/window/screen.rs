@@ -77,14 +77,7 @@ impl Screen {
         let renderer = Renderer::new(&gpu.device, &gpu.queue, asset, format)?;
         let panel = egui_wgpu::Renderer::new(&gpu.device, format, RendererOptions::default());
         gpu.check()?;
-        Ok(Self {
-            window,
-            gpu,
-            renderer,
-            surface,
-            config,
-            panel,
-        })
+        Ok(Self { window, gpu, renderer, surface, config, panel })
     }
 
     /// Follows the window's size.
@@ -97,6 +90,19 @@ impl Screen {
     /// Columns and rows of the surface.
     pub fn size(&self) -> [u32; 2] {
         [self.config.width, self.config.height]
+    }
+
+    /// Draws rays of a picture without showing it, and waits for them.
+    ///
+    /// # Errors
+    /// The GPU failed.
+    pub fn draw(&mut self, request: &Request) -> Result<()> {
+        let (device, queue) = (&self.gpu.device, &self.gpu.queue);
+        let mut encoder = device.create_command_encoder(&Default::default());
+        self.renderer.prepare(device, queue, &mut encoder, request)?;
+        queue.submit([encoder.finish()]);
+        device.poll(PollType::wait_indefinitely()).map_err(|e| anyhow!("the GPU failed: {e}"))?;
+        Ok(self.gpu.check()?)
     }
 
     /// Draws a frame and waits for it. `Ok(None)` where nothing was to be captured.
@@ -121,9 +127,7 @@ impl Screen {
         }
         let jobs = &painting.jobs;
         // Command buffers come back only from paint callbacks, which the panel does not use.
-        let _ = self
-            .panel
-            .update_buffers(device, queue, &mut encoder, jobs, &descriptor);
+        let _ = self.panel.update_buffers(device, queue, &mut encoder, jobs, &descriptor);
         let shown = match self.surface.get_current_texture() {
             CurrentSurfaceTexture::Success(t) | CurrentSurfaceTexture::Suboptimal(t) => Some(t),
             CurrentSurfaceTexture::Outdated | CurrentSurfaceTexture::Lost => {
@@ -152,10 +156,7 @@ impl Screen {
         }
         self.renderer.statistics();
         // Waiting keeps slow adapters from falling ever further behind the pointer.
-        self.gpu
-            .device
-            .poll(PollType::wait_indefinitely())
-            .map_err(|e| anyhow!("the GPU failed: {e}"))?;
+        self.gpu.device.poll(PollType::wait_indefinitely()).map_err(|e| anyhow!("the GPU failed: {e}"))?;
         self.gpu.check()?;
         copy.map(|copy| self.read(&copy)).transpose()
     }
@@ -175,10 +176,7 @@ impl Screen {
                     view,
                     depth_slice: None,
                     resolve_target: None,
-                    ops: Operations {
-                        load: LoadOp::Clear(Color::BLACK),
-                        store: StoreOp::Store,
-                    },
+                    ops: Operations { load: LoadOp::Clear(Color::BLACK), store: StoreOp::Store },
                 })],
                 depth_stencil_attachment: None,
                 timestamp_writes: None,
@@ -198,11 +196,7 @@ impl Screen {
     fn offscreen(&self) -> Texture {
         self.gpu.device.create_texture(&TextureDescriptor {
             label: Some("capture"),
-            size: Extent3d {
-                width: self.config.width,
-                height: self.config.height,
-                depth_or_array_layers: 1,
-            },
+            size: Extent3d { width: self.config.width, height: self.config.height, depth_or_array_layers: 1 },
             mip_level_count: 1,
             sample_count: 1,
             dimension: TextureDimension::D2,
@@ -214,10 +208,7 @@ impl Screen {
 
     fn read(&self, texture: &Texture) -> Result<Capture> {
         let bytes = read_texture(&self.gpu.device, &self.gpu.queue, texture)?;
-        let swapped = matches!(
-            self.config.format,
-            TextureFormat::Bgra8Unorm | TextureFormat::Bgra8UnormSrgb
-        );
+        let swapped = matches!(self.config.format, TextureFormat::Bgra8Unorm | TextureFormat::Bgra8UnormSrgb);
         let rgb = bytes
             .as_chunks::<4>()
             .0
