@@ -63,7 +63,7 @@ impl Workbench {
         let name = format!("diaphane-{program}{}", std::env::consts::EXE_SUFFIX);
         let path = validate.with_file_name(&name);
         if !path.is_file() {
-            println!("skipped: {name} is not built; test with --workspace");
+            tell(&format!("skipped: {name} is not built; test with --workspace"));
             return None;
         }
         Some(Command::new(path).current_dir(self.folder.path()).args(arguments).output().unwrap())
@@ -111,4 +111,10 @@ impl<'a, const N: usize> With<'a> for [&'a str; N] {
     fn with(&self, first: &'a str) -> Vec<&'a str> {
         std::iter::once(first).chain(self.iter().copied()).collect()
     }
+}
+
+/// Says why a test does nothing, past the test runner's capture of the print macros.
+fn tell(line: &str) {
+    use std::io::Write;
+    let _ = writeln!(std::io::stderr(), "{line}");
 }
