@@ -72,7 +72,7 @@ pub fn bake(input: &Input<'_>, params: &Params, progress: &dyn Progress) -> Resu
     let mut timed = Timed::new(progress);
     let shape = timed.stage("distance field", |p| field::Shape::new(input.mesh, params, p))?;
     let medium = timed.stage("medium", |_| Ok(Prepared::new(input.medium, input.mesh)))?;
-    let layers = timed.stage("layers", |p| layers::build(&shape, input.medium, params, p))?;
+    let layers = timed.stage("layers", |p| layers::build(&shape, input.medium, p))?;
     let density = timed.stage("density", |p| density::evaluate(&shape, &layers, &medium, params, p))?;
     let placed =
         timed.stage("samples", |p| samples::place(&shape, &layers, &density, input.medium, params, p))?;

@@ -173,18 +173,18 @@ pub fn write_png(path: &Path, picture: &Picture, display: Display) -> Result<()>
     write_png_bytes(path, picture.width, picture.height, &rgb)
 }
 
-/// Reads a coverage mask: .npy (H×W; integers are taken as 0..255) or .exr (alpha, else the first channel).
+/// Reads a coverage mask: .npy (H×W; bytes are taken as 0..255) or .exr (alpha, else the first channel).
 ///
 /// # Errors
 /// Unreadable file, wrong type or dimensions.
 pub fn read_coverage(path: &Path) -> Result<(usize, usize, Vec<f32>)> {
     if path.extension().and_then(|e| e.to_str()) == Some("npy") {
         let bytes = files::read(path)?;
-        let (shape, mut values) = medium::read_npy(&bytes).map_err(|e| e.in_file(path))?;
+        let (shape, kind, mut values) = medium::read_npy(&bytes).map_err(|e| e.in_file(path))?;
         let [height, width] = shape[..] else {
             return Err(Error::file(path, "a coverage mask has two dimensions (rows, columns)"));
         };
-        if values.iter().any(|v| *v > 1.0) {
+        if kind == medium::NpyKind::Bytes {
             values.iter_mut().for_each(|v| *v /= 255.0);
         }
         return Ok((width, height, values));

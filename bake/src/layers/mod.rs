@@ -7,7 +7,6 @@ mod isosurface;
 
 use crate::Result;
 use crate::field::Shape;
-use crate::params::Params;
 use crate::progress::Stage;
 use diaphane_formats::medium::Medium;
 use glam::DVec3;
@@ -28,12 +27,7 @@ pub(crate) struct Layer {
 /// Each slab is this much thicker than the one above it.
 const GROWTH: f64 = 1.25;
 
-pub(crate) fn build(
-    shape: &Shape<'_>,
-    medium: &Medium,
-    params: &Params,
-    stage: Stage<'_>,
-) -> Result<Vec<Layer>> {
+pub(crate) fn build(shape: &Shape<'_>, medium: &Medium, stage: Stage<'_>) -> Result<Vec<Layer>> {
     let deepest = shape.grid.depth.iter().copied().fold(0.0, f32::max) as f64;
     // Slabs no thicker than the samples' spacing or half a mean free path near the surface.
     let kappa = medium.reference_extinction().max(1e-9 / shape.diagonal);
@@ -44,7 +38,6 @@ pub(crate) fn build(
         offsets.push(next);
         step = (step * GROWTH).min(4.0 * shape.spacing.max(first));
     }
-    debug_assert!(params.samples > 0);
     stage.expect(offsets.len());
     let layers = offsets
         .par_iter()

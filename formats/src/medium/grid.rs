@@ -54,7 +54,10 @@ impl Grid {
         if path.extension().and_then(|e| e.to_str()) != Some("npy") {
             return Err(Error::file(path, "density grids are .npy files"));
         }
-        let (shape, values) = read_npy(&files::read(path)?).map_err(|e| e.in_file(path))?;
+        let (shape, kind, values) = read_npy(&files::read(path)?).map_err(|e| e.in_file(path))?;
+        if kind == NpyKind::Bytes {
+            return Err(Error::file(path, "holds 8-bit integers; save the densities as float32 or float64"));
+        }
         let [nz, ny, nx] = shape[..] else {
             return Err(Error::file(
                 path,
@@ -156,8 +159,17 @@ impl Grid {
     }
 }
 
-/// Shape and values of a float .npy file; the data must fill the file exactly.
-pub(crate) fn read_npy(bytes: &[u8]) -> Result<(Vec<usize>, Vec<f32>)> {
+/// What an .npy file held before it became f32.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum NpyKind {
+    /// float32 or float64.
+    Floats,
+    /// uint8.
+    Bytes,
+}
+
+/// Shape, kind and values of an .npy file; the data must fill the file exactly.
+pub(crate) fn read_npy(bytes: &[u8]) -> Result<(Vec<usize>, NpyKind, Vec<f32>)> {
     let bad = |m: String| Error::invalid(format!("is not a usable .npy file: {m}"));
     let file = npyz::NpyFile::new(bytes).map_err(|e| bad(e.to_string()))?;
     if file.order() != npyz::Order::C {
@@ -184,7 +196,8 @@ pub(crate) fn read_npy(bytes: &[u8]) -> Result<(Vec<usize>, Vec<f32>)> {
         8 => file.into_vec::<f64>().map_err(failed)?.into_iter().map(|v| v as f32).collect(),
         _ => file.into_vec::<u8>().map_err(failed)?.into_iter().map(f32::from).collect(),
     };
-    Ok((shape, values))
+    let kind = if size == 1 { NpyKind::Bytes } else { NpyKind::Floats };
+    Ok((shape, kind, values))
 }
 
 /// Bytes before the data: magic, version, header length field, header (NumPy's format description).
@@ -230,6 +243,21 @@ mod tests {
         let p = DVec3::new(0.2, 1.1, 3.0);
         assert!((grid.value(p) - f(p)).abs() < 1e-5);
         assert!((grid.value(DVec3::new(-9.0, 1.5, 3.0)) - f(DVec3::new(-0.75, 1.5, 3.0))).abs() < 1e-5);
+    }
+
+    #[test]
+    fn integers_are_no_densities() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.npy");
+        let mut header = b"\x93NUMPY\x01\x00".to_vec();
+        let text = "{'descr': '|u1', 'fortran_order': False, 'shape': (1, 1, 2), }\n";
+        header.extend((text.len() as u16).to_le_bytes());
+        header.extend(text.bytes());
+        header.extend([1, 2]);
+        assert_eq!(read_npy(&header).unwrap(), (vec![1, 1, 2], NpyKind::Bytes, vec![1.0, 2.0]));
+        std::fs::write(&path, header).unwrap();
+        let error = Grid::load_npy(&path, DVec3::ZERO, DVec3::ONE).unwrap_err().to_string();
+        assert!(error.contains("float32"), "{error}");
     }
 
     #[test]
