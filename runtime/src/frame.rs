@@ -51,7 +51,8 @@ pub struct View {
 impl View {
     /// Unit direction of a ray; `x` and `y` in pixels from the top left corner.
     pub fn direction(&self, x: f32, y: f32, width: u32, height: u32) -> Vec3 {
-        let (sx, sy) = (2.0 * x / width as f32 - 1.0, 1.0 - 2.0 * y / height as f32);
+        // Times the size of a pixel: graphics drivers round divisions differently, and these rays must be theirs.
+        let (sx, sy) = (x * (2.0 / width as f32) - 1.0, 1.0 - y * (2.0 / height as f32));
         (self.forward + self.right * sx + self.up * sy).normalize()
     }
 }

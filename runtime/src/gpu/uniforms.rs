@@ -30,12 +30,13 @@ pub(super) struct ViewUniform {
     pub tile_start: [u32; 2],
     pub tile_size: [u32; 2],
     pub offset: [f32; 2],
+    pub pixel: [f32; 2],
     pub near: f32,
     pub least_distance: f32,
     pub specular: f32,
     pub alpha: f32,
     pub rays: u32,
-    pub unused: u32,
+    pub unused: [u32; 3],
 }
 
 impl ViewUniform {
@@ -54,12 +55,13 @@ impl ViewUniform {
             tile_start: tile.start,
             tile_size: tile.size,
             offset,
+            pixel: [2.0 / frame.width as f32, 2.0 / frame.height as f32],
             near: NEAR * diagonal,
             least_distance: frame.least_distance,
             specular: if surface.reflection { surface.specular as f32 } else { 0.0 },
             alpha: (surface.roughness as f32).max(crate::cpu::surface::LEAST_ROUGHNESS).powi(2),
             rays,
-            unused: 0,
+            unused: [0; 3],
         }
     }
 }
@@ -204,6 +206,7 @@ mod tests {
             tile_start,
             tile_size,
             offset,
+            pixel,
             near,
             least_distance,
             specular,

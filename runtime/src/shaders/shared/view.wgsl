@@ -11,6 +11,7 @@ struct View {
     tile_start: vec2u,      // column and row of the tile's first pixel
     tile_size: vec2u,       // columns and rows of the tile
     offset: vec2f,          // position of this ray inside its pixel, each in (0, 1)
+    pixel: vec2f,           // 2 / width and 2 / height: divisions round differently from driver to driver
     near: f32,              // surface nearer than this is not seen
     least_distance: f32,    // where the inverse square law is clamped
     specular: f32,          // 0: no highlights
@@ -23,10 +24,11 @@ struct View {
 // Unit direction of the ray through `pixel` of the tile.
 fn ray_direction(pixel: vec2u) -> vec3f {
     let at = vec2f(view.tile_start + pixel) + view.offset;
-    let sx = 2.0 * at.x / f32(view.width) - 1.0;
-    let sy = 1.0 - 2.0 * at.y / f32(view.height);
+    let sx = at.x * view.pixel.x - 1.0;
+    let sy = 1.0 - at.y * view.pixel.y;
     let d = view.forward + view.right * sx + view.up * sy;
-    return d * (1.0 / length(d));
+    // Spelt out, so that it rounds as on the CPU where the driver does as it is told.
+    return d * (1.0 / sqrt(d.x * d.x + d.y * d.y + d.z * d.z));
 }
 
 // Where a pixel keeps its state.
