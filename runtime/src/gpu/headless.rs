@@ -44,6 +44,12 @@ impl GpuRenderer {
         &self.name
     }
 
+    /// Bounds the memory that the state of a picture's pixels takes on the adapter, 512 MiB at first; pictures that
+    /// need more are drawn in tiles.
+    pub fn limit_memory(&mut self, bytes: u64) {
+        self.renderer.most_memory = bytes;
+    }
+
     /// Tiles that the last picture was drawn in; more than one where it was too large for the adapter's buffers.
     pub fn tiles(&self) -> usize {
         self.tiles

@@ -10,7 +10,7 @@ use super::passes::slopes::Slopes;
 use super::passes::splat::Splat;
 use super::passes::surface::Surface;
 use super::scene::{AssetBuffers, FrameBuffers, VIEW_STRIDE, common_layout};
-use super::targets::{Targets, budget};
+use super::targets::{TOTAL, Targets, budget};
 use super::tiles::{Tile, split};
 use super::timers::Timers;
 use super::uniforms::ViewUniform;
@@ -35,6 +35,8 @@ pub(super) struct Pipeline {
     pub(super) asset: AssetBuffers,
     frame: FrameBuffers,
     targets: Option<(Targets, Groups)>,
+    /// Bytes that the state of all pixels may take.
+    pub(super) most_memory: u64,
 }
 
 /// The groups of all passes.
@@ -74,6 +76,7 @@ impl Pipeline {
             common,
             asset,
             targets: None,
+            most_memory: TOTAL,
         })
     }
 
@@ -86,7 +89,7 @@ impl Pipeline {
         exact: Option<&ExactDepths>,
     ) -> Result<Vec<Tile>> {
         self.frame.write_lights(device, queue, &self.asset, frame, exact)?;
-        let tiles = split(frame.width, frame.height, budget(device, &self.asset))?;
+        let tiles = split(frame.width, frame.height, budget(device, &self.asset, self.most_memory))?;
         // The first tile is the largest; `split` returns at least one.
         let fits = self.targets.as_ref().is_some_and(|(t, _)| t.size == tiles[0].size);
         if !fits || self.frame.take_changed() {

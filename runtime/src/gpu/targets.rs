@@ -18,7 +18,7 @@ pub(super) const MARKER_FORMAT: TextureFormat = TextureFormat::R8Unorm;
 pub(super) const ARGUMENTS: u64 = 32;
 
 /// State of all pixels together stays below this, so that large pictures leave memory to others.
-const TOTAL: u64 = 512 << 20;
+pub(super) const TOTAL: u64 = 512 << 20;
 
 const CROSSINGS: u64 = 40;
 const BOUNDARY: u64 = 48;
@@ -48,7 +48,7 @@ pub(super) struct Targets {
 }
 
 /// How large tiles may be.
-pub(super) fn budget(device: &Device, asset: &AssetBuffers) -> Budget {
+pub(super) fn budget(device: &Device, asset: &AssetBuffers, total: u64) -> Budget {
     let limits = device.limits();
     let profile = if asset.heterogeneous { PROFILE } else { 0 };
     let boundary = if asset.fresnel { BOUNDARY } else { 0 };
@@ -56,7 +56,7 @@ pub(super) fn budget(device: &Device, asset: &AssetBuffers) -> Budget {
     Budget {
         side: limits.max_texture_dimension_2d,
         binding: limits.max_storage_buffer_binding_size.min(limits.max_buffer_size),
-        total: TOTAL,
+        total,
         pixel_binding: profile.max(pieces),
         // Three vectors of state, two textures, the marker, and what is read back.
         pixel_total: CROSSINGS + boundary + pieces + profile + 3 * 16 + 2 * 16 + 1 + 2 * 16,
