@@ -174,6 +174,9 @@ fn run_bake(arguments: &BakeArguments) -> anyhow::Result<()> {
         let text = serde_json::to_string_pretty(&report).context("cannot encode the report")?;
         files::write_atomically(path, text.as_bytes())?;
     }
+    for line in &report.shortfalls {
+        eprintln!("warning: {line}");
+    }
     if !arguments.quiet {
         println!(
             "{}: {} samples, {} directions, {} bands, {:.1} MB, {:.1} s",

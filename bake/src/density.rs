@@ -58,7 +58,7 @@ fn fluence(
 ) -> Result<Vec<f32>> {
     let kappa = medium.medium.reference_extinction() as f32;
     let axes: Vec<DVec3> = even_directions(count, seed).into_iter().step_by(2).collect();
-    stage.expect(axes.len());
+    stage.announce(axes.len());
     let mut sum = vec![0.0f32; points.len()];
     // A few directions at a time keep memory small; the order of the sums is fixed.
     for group in axes.chunks(8) {

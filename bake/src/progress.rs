@@ -33,7 +33,7 @@ pub(crate) struct Stage<'a> {
 
 impl Stage<'_> {
     /// Announces how many units follow.
-    pub fn expect(&self, total: usize) {
+    pub fn announce(&self, total: usize) {
         self.progress.stage(self.name, total as u64);
     }
 

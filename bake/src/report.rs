@@ -35,6 +35,8 @@ pub struct Report {
     pub skipped: BTreeMap<String, usize>,
     /// What was mended in the mesh, in sentences.
     pub warnings: Vec<String>,
+    /// What the bake could not do as asked, in sentences.
+    pub shortfalls: Vec<String>,
 }
 
 impl Report {
@@ -52,6 +54,11 @@ impl Report {
             ("distance_queries".to_owned(), shape.skipped_nodes),
             ("dark_or_outside_candidates".to_owned(), lit.dark_candidates),
         ]);
+        let found = lit.samples.len();
+        let mut shortfalls = Vec::new();
+        if found.abs_diff(params.samples) * 20 > params.samples {
+            shortfalls.push(format!("{} samples were asked for, {found} found a place", params.samples));
+        }
         Self {
             samples: lit.samples.len(),
             directions: params.directions,
@@ -64,6 +71,7 @@ impl Report {
             snapped: lit.snapped,
             layers: layers.len(),
             skipped,
+            shortfalls,
             warnings: asset.info.provenance.mesh_report.warnings(),
         }
     }

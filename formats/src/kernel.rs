@@ -15,9 +15,9 @@
 //!      = √π/2a · [ 2 f(peak) - f(start) W(-x0) - f(end) W(x1) ]  otherwise
 //!
 //! which never forms e^{κ²/4a²} and so neither overflows nor cancels; short pieces use three Gauss-Legendre points.
-//! Checked against adaptive quadrature in f64 over 40 decades of a, κ and distance.
+//! Checked against adaptive quadrature in f64 over 12 decades of a and 8 of κ/a.
 
-/// Exponent at which the kernel is cut: e^-5 (FINDINGS of the project: no loss in accuracy at this value).
+/// Exponent at which the kernel is cut.
 pub const CUT_OFF: f32 = 5.0;
 /// e^{-CUT_OFF}.
 pub const CUT_OFF_VALUE: f32 = 0.006_737_947;

@@ -8,7 +8,7 @@
 //! mean under the kernel's weight (see [`crate::hits`]). In a homogeneous medium W_i is the closed form of [`crate::kernel`] and
 //! A = 1 - e^{-κ(t1-t0)}. Otherwise a [`Profile`] of the density along the piece supplies τ at the ends of the
 //! kernel's support; between them τ is taken as linear, and σ is the mean scattering density there.
-//! (FINDINGS of the project, section 2; the thesis sums v_i ∫γ_i dt alone, equation 3.4.)
+//! (The thesis sums v_i ∫γ_i dt alone, equation 3.4.)
 
 use crate::asset::{DensityGrid, Samples};
 use crate::hits::{Hit, Hits};

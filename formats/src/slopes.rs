@@ -7,8 +7,7 @@
 //!
 //! with c the centroids at which the values hold. The vectors M⁻¹ w_j d_j depend on the samples alone and are kept
 //! ([`Stencil`]); a frame only sums. |h| is limited to three times the extinction, beyond which no light fades.
-//! A [`Source`] then stands for v(x) = value · e^{h·(x-b)} around its kernel's centre b: always positive, and as good
-//! as the exact gradient (FINDINGS of the project, section 2).
+//! A [`Source`] then stands for v(x) = value · e^{h·(x-b)} around its kernel's centre b, which is always positive.
 
 use crate::asset::Samples;
 use glam::{Mat3, Vec3};

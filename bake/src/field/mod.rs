@@ -71,7 +71,7 @@ impl<'a> Shape<'a> {
         let size = [extent.x, extent.y, extent.z].map(|e| (e / cell).ceil() as usize + 4);
         let mut grid = DistanceGrid { size, origin, cell, depth: Vec::new() };
         let count = size.iter().product::<usize>();
-        stage.expect(count);
+        stage.announce(count);
         let nodes: Vec<DVec3> = (0..count).map(|i| grid.node(i)).collect();
         let inside = inside_nodes(mesh, &nodes)?;
         let skipped = std::sync::atomic::AtomicUsize::new(0);

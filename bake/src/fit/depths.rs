@@ -43,7 +43,7 @@ pub(crate) fn depths(
     let per_sample = params.points_per_sample;
     let points = cells::points(shape, &placed.samples, per_sample, hash(params.seed, 37))?;
     let (n, d) = (placed.samples.len(), directions.len());
-    stage.expect(d.div_ceil(2));
+    stage.announce(d.div_ceil(2));
     let matched = medium.medium.ior() == 1.0;
     let kappa = medium.medium.reference_extinction() as f32;
     let mut transmittance = vec![0.0f32; n * d];
@@ -93,9 +93,10 @@ pub(crate) fn depths(
             let psi = &transmittance[i * d..(i + 1) * d];
             let through = |k: usize| boundary.get(i * d + k).copied().unwrap_or(1.0);
             let light: f32 = psi.iter().enumerate().map(|(k, psi)| psi * through(k)).sum();
-            // The layers' estimate decided before; only what is clearly darker goes now.
+            // The layers decided before; the mean over the points of a sample on the boundary of a dense medium may lie
+            // far below, yet it is all the light there is: only what is dark beyond doubt goes now.
             let outside = 2 * outside_votes[i] as usize > d * per_sample;
-            f64::from(light) / d as f64 >= 0.2 * DARK && !outside
+            f64::from(light) / d as f64 >= 1e-3 * DARK && !outside
         })
         .collect();
     let kept = keep.iter().filter(|k| **k).count();

@@ -32,7 +32,7 @@ pub(crate) fn harmonics(lit: &Lit, params: &Params, stage: Stage<'_>) -> Result<
     }
     let basis = Basis { rows: lit.directions.len(), columns, values };
     let n = lit.samples.len();
-    stage.expect(n);
+    stage.announce(n);
     let mut depth = vec![0.0f32; n * columns];
     let mut boundary = vec![0.0f32; if lit.boundary.is_empty() { 0 } else { n * columns }];
     let chunk = 256;

@@ -66,7 +66,7 @@ impl Rows {
 }
 
 pub(crate) fn weights(lit: &Lit, params: &Params, stage: Stage<'_>) -> Result<Vec<f32>> {
-    stage.expect(ITERATIONS);
+    stage.announce(ITERATIONS);
     let origin = lit.samples.first().map_or(glam::DVec3::ZERO, |s| s.position);
     let local = |p: glam::DVec3| (p - origin).as_vec3();
     let centre: Vec<Vec3> = lit.samples.iter().map(|s| local(s.position)).collect();

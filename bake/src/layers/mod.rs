@@ -38,7 +38,7 @@ pub(crate) fn build(shape: &Shape<'_>, medium: &Medium, stage: Stage<'_>) -> Res
         offsets.push(next);
         step = (step * GROWTH).min(4.0 * shape.spacing.max(first));
     }
-    stage.expect(offsets.len());
+    stage.announce(offsets.len());
     let layers = offsets
         .par_iter()
         .enumerate()

@@ -15,6 +15,10 @@ use rayon::prelude::*;
 
 /// Candidates for each wanted sample.
 const OVERSAMPLING: usize = 16;
+/// Usable candidates for each wanted sample that end the drawing.
+const ENOUGH: usize = 10;
+/// Draws at the most.
+const ROUNDS: u64 = 8;
 
 pub(super) struct Drawn {
     pub list: Vec<Candidate>,
@@ -51,47 +55,48 @@ pub(super) fn draw(
         return Ok(Drawn { list: Vec::new(), dark: 0 });
     }
     let wanted = OVERSAMPLING * params.samples + 64;
-    let seed = hash(params.seed, 23);
-    let mut list: Vec<Candidate> = (0..wanted)
-        .into_par_iter()
-        .map(|i| {
-            let mut rng = Pcg64Mcg::seed_from_u64(hash(seed, i as u64));
-            // Stratified over the cumulative mass, so that every patch gets its share.
-            let mass = (i as f64 + rng.random::<f64>()) / wanted as f64 * total;
-            let patch = &patches[cumulative.partition_point(|c| *c <= mass).min(patches.len() - 1)];
-            let layer = &layers[patch.layer as usize];
-            let corners = layer.triangles[patch.triangle as usize].map(|v| v as usize);
-            let bary = barycentric(rng.random(), rng.random());
-            let down: f64 = rng.random();
-            let mut position = DVec3::ZERO;
-            let mut inward = DVec3::ZERO;
-            let mut log_fluence = 0.0;
-            let (top, bottom) = (&fluence.top[patch.layer as usize], &fluence.bottom[patch.layer as usize]);
-            for (b, v) in bary.into_iter().zip(corners) {
-                position += layer.positions[v] * b;
-                inward += layer.inward[v] * b;
-                let log = |f: f32| f64::from(f.max(1e-12)).ln();
-                log_fluence += b * (log(top[v]) * (1.0 - down) + log(bottom[v]) * down);
-            }
-            position += inward.normalize_or_zero() * (down * layer.thickness);
-            let fluence = log_fluence.exp();
-            let radius = relative_radius(medium.density(position) * fluence);
-            Candidate { position, radius, fluence }
-        })
-        .collect();
-    list.extend(fill(shape, &list, layers));
-    let before = list.len();
-    let keep = usable(shape, medium, &list)?;
-    let mut kept: Vec<(u64, Candidate)> = list
-        .into_iter()
-        .zip(keep)
-        .enumerate()
-        .filter(|(_, (_, keep))| *keep)
-        .map(|(i, (c, _))| (hash(hash(params.seed, 29), i as u64), c))
-        .collect();
-    let dark = before - kept.len();
-    kept.sort_unstable_by_key(|(key, _)| *key);
-    Ok(Drawn { list: kept.into_iter().map(|(_, c)| c).collect(), dark })
+    let one = |seed: u64, i: usize| {
+        let mut rng = Pcg64Mcg::seed_from_u64(hash(seed, i as u64));
+        // Stratified over the cumulative mass, so that every patch gets its share.
+        let mass = (i as f64 + rng.random::<f64>()) / wanted as f64 * total;
+        let patch = &patches[cumulative.partition_point(|c| *c <= mass).min(patches.len() - 1)];
+        let layer = &layers[patch.layer as usize];
+        let corners = layer.triangles[patch.triangle as usize].map(|v| v as usize);
+        let bary = barycentric(rng.random(), rng.random());
+        let down: f64 = rng.random();
+        let mut position = DVec3::ZERO;
+        let mut inward = DVec3::ZERO;
+        let mut log_fluence = 0.0;
+        let (top, bottom) = (&fluence.top[patch.layer as usize], &fluence.bottom[patch.layer as usize]);
+        for (b, v) in bary.into_iter().zip(corners) {
+            position += layer.positions[v] * b;
+            inward += layer.inward[v] * b;
+            let log = |f: f32| f64::from(f.max(1e-12)).ln();
+            log_fluence += b * (log(top[v]) * (1.0 - down) + log(bottom[v]) * down);
+        }
+        position += inward.normalize_or_zero() * (down * layer.thickness);
+        let fluence = log_fluence.exp();
+        let radius = relative_radius(medium.density(position) * fluence);
+        Candidate { position, radius, fluence }
+    };
+    // Where light reaches a thin shell only, few candidates are usable: draw again until there are enough.
+    let mut list: Vec<Candidate> = Vec::new();
+    let mut dark = 0;
+    for round in 0..ROUNDS {
+        let seed = hash(hash(params.seed, 23), round);
+        let drawn: Vec<Candidate> = (0..wanted).into_par_iter().map(|i| one(seed, i)).collect();
+        let kept = usable(shape, medium, &drawn)?;
+        dark += drawn.len() - kept.len();
+        list.extend(kept);
+        if list.len() >= ENOUGH * params.samples {
+            break;
+        }
+    }
+    let mut order: Vec<(u64, Candidate)> =
+        list.iter().enumerate().map(|(i, c)| (hash(hash(params.seed, 29), i as u64), *c)).collect();
+    order.sort_unstable_by_key(|(key, _)| *key);
+    let fill = usable(shape, medium, &fill(shape, &list, layers))?;
+    Ok(Drawn { list: order.into_iter().map(|(_, c)| c).chain(fill).collect(), dark })
 }
 
 fn patches(layers: &[Layer], fluence: &LayerFluence, medium: &Medium) -> Vec<Patch> {
@@ -156,13 +161,14 @@ fn fill(shape: &Shape<'_>, drawn: &[Candidate], layers: &[Layer]) -> Vec<Candida
         .collect()
 }
 
-/// Candidates that are inside, lit and where something scatters.
-fn usable(shape: &Shape<'_>, medium: &Medium, list: &[Candidate]) -> Result<Vec<bool>> {
+/// The candidates that are inside, lit and where something scatters.
+fn usable(shape: &Shape<'_>, medium: &Medium, list: &[Candidate]) -> Result<Vec<Candidate>> {
     let points: Vec<DVec3> = list.iter().map(|c| c.position).collect();
     let inside = inside_nodes(shape.mesh, &points)?;
-    Ok(list
+    let keep: Vec<bool> = list
         .par_iter()
         .zip(inside)
         .map(|(c, inside)| inside && c.fluence >= DARK && medium.density_and_scattering(c.position).1 > 0.0)
-        .collect())
+        .collect();
+    Ok(list.iter().zip(keep).filter(|(_, keep)| *keep).map(|(c, _)| *c).collect())
 }

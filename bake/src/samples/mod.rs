@@ -54,7 +54,7 @@ pub(crate) fn place(
     if drawn.list.is_empty() {
         return Err(Error::NoRoom("no light reaches its inside, or nothing there scatters".to_owned()));
     }
-    stage.expect(8);
+    stage.announce(8);
     let mut samples = darts::throw_to_count(shape, &drawn.list, params.samples, &stage)?;
     let snapped = snap_to_boundary(shape, &mut samples);
     let probes = drawn.list.iter().take(PROBES_PER_SAMPLE * samples.len()).copied().collect();
