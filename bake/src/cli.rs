@@ -61,10 +61,16 @@ struct BakeArguments {
     /// Directions in which the optical depth of each sample is computed.
     #[arg(long, value_name = "D")]
     directions: Option<usize>,
-    /// Bands of spherical harmonics, 1 to 10.
+    /// Points around each sample over which its transmittance is averaged.
+    #[arg(long, value_name = "P")]
+    points: Option<usize>,
+    /// Most bands of spherical harmonics, 1 to 14; a sample gets as few as it needs.
     #[arg(long, value_name = "K")]
     sh_order: Option<usize>,
-    /// What the harmonics represent: 1/(τ+ε) fitted to the transmittance, or the plain transmittance.
+    /// Error of a sample's transmittance below which it gets no more bands (0: every sample gets all).
+    #[arg(long, value_name = "E")]
+    light_error: Option<f64>,
+    /// What the harmonics represent.
     #[arg(long, value_enum, default_value_t = EncodingName::Reciprocal)]
     encoding: EncodingName,
     /// Seed of all random choices.
@@ -83,17 +89,23 @@ struct BakeArguments {
 
 #[derive(Clone, Copy, ValueEnum)]
 enum PresetName {
-    /// 5,000 samples, 96 directions, 5 bands.
+    /// 5,000 samples, 96 directions, at most 6 bands.
     Draft,
-    /// 50,000 samples, 256 directions, 7 bands.
+    /// 50,000 samples, 256 directions, at most 10 bands.
     Standard,
-    /// 50,000 samples, 512 directions, 9 bands.
+    /// 50,000 samples, 512 directions, at most 14 bands.
     Fine,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
 enum EncodingName {
+    /// 1/(τ+ε), fitted to the transmittance.
     Reciprocal,
+    /// The same with a lobe towards the nearest surface beside the harmonics.
+    Lobe,
+    /// The optical depth τ, fitted to the transmittance.
+    Depth,
+    /// The transmittance, projected: the baseline.
     Transmittance,
 }
 
@@ -106,10 +118,14 @@ impl BakeArguments {
         });
         params.samples = self.samples.unwrap_or(params.samples);
         params.directions = self.directions.unwrap_or(params.directions);
+        params.points_per_sample = self.points.unwrap_or(params.points_per_sample);
         params.order = self.sh_order.unwrap_or(params.order);
+        params.light_error = self.light_error.unwrap_or(params.light_error);
         params.seed = self.seed.unwrap_or(params.seed);
         params.encoding = match self.encoding {
             EncodingName::Reciprocal => Encoding::RECIPROCAL,
+            EncodingName::Lobe => Encoding::LOBE,
+            EncodingName::Depth => Encoding::Depth,
             EncodingName::Transmittance => Encoding::Transmittance,
         };
         params

@@ -34,7 +34,8 @@ fn describe(asset: &Asset, sections: &[(&'static str, usize)], bytes: usize) -> 
 
 /// Average over the sections that grow with the samples.
 fn bytes_per_sample(asset: &Asset, sections: &[(&'static str, usize)]) -> f64 {
-    const PER_SAMPLE: [&str; 5] = ["position_radius", "offset", "weight", "depth", "boundary"];
+    const PER_SAMPLE: [&str; 8] =
+        ["place", "offset", "weight", "depth", "depth_scale", "lobe", "boundary", "boundary_scale"];
     let sum: usize = sections.iter().filter(|(n, _)| PER_SAMPLE.contains(n)).map(|(_, s)| s).sum();
     sum as f64 / asset.samples.len().max(1) as f64
 }

@@ -1,6 +1,6 @@
 //! Everything into one asset.
 
-use crate::fit::{Harmonics, Lit};
+use crate::fit::{Light, Lit, boundary_order};
 use crate::params::Params;
 use crate::{Input, Result};
 use diaphane_formats::asset::{Asset, DensityGrid, Info, Provenance, Samples};
@@ -18,7 +18,7 @@ pub(crate) fn pack(
     sampled: Option<&SampledDensity>,
     params: &Params,
     lit: &Lit,
-    harmonics: Harmonics,
+    light: Light,
     weight: Vec<f32>,
 ) -> Result<Asset> {
     let (low, high) = input.mesh.bounds();
@@ -62,6 +62,8 @@ pub(crate) fn pack(
         samples: lit.samples.len() as u64,
         discarded: lit.discarded as u64,
         order: params.order as u32,
+        light_error: params.light_error,
+        boundary_order: boundary_order(medium.ior(), params.order) as u32,
         encoding: params.encoding,
         reference_extinction: medium.reference_extinction(),
         width_factor: params.width_factor,
@@ -72,8 +74,9 @@ pub(crate) fn pack(
             position_radius,
             offset,
             weight,
-            depth: harmonics.depth,
-            boundary: harmonics.boundary,
+            depth: light.depth,
+            lobe: light.lobe,
+            boundary: light.boundary,
         },
         mesh_positions: input.mesh.positions.iter().map(|p| local(*p)).collect(),
         mesh_triangles: input.mesh.triangles.clone(),

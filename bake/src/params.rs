@@ -13,8 +13,11 @@ pub struct Params {
     pub directions: usize,
     /// Points around each sample over which its transmittance is averaged.
     pub points_per_sample: usize,
-    /// Bands of spherical harmonics, 1..=10.
+    /// Most bands of spherical harmonics, 1..=14.
     pub order: usize,
+    /// A sample gets no more bands once the root mean square error of its transmittance is below this; 0: all get
+    /// all.
+    pub light_error: f64,
     /// Seed of all random choices.
     pub seed: u64,
     /// What the harmonics represent.
@@ -52,19 +55,20 @@ pub enum Preset {
 impl Params {
     /// The parameters of a preset.
     pub fn preset(preset: Preset) -> Self {
-        let (samples, directions, points_per_sample, order) = match preset {
-            Preset::Draft => (5_000, 96, 4, 5),
-            Preset::Standard => (50_000, 256, 8, 7),
-            Preset::Fine => (50_000, 512, 16, 9),
+        let (samples, directions, points_per_sample, order, light_error) = match preset {
+            Preset::Draft => (5_000, 96, 4, 6, 0.03),
+            Preset::Standard => (50_000, 256, 8, 10, 0.01),
+            Preset::Fine => (50_000, 512, 16, 14, 0.003),
         };
         Self {
             samples,
             directions,
             points_per_sample,
             order,
+            light_error,
             seed: 1,
             encoding: Encoding::RECIPROCAL,
-            width_factor: 1.4,
+            width_factor: 1.35,
         }
     }
 
@@ -84,6 +88,9 @@ impl Params {
         }
         if !(1..=MAX_ORDER).contains(&self.order) {
             return fail(format!("--sh-order must lie within 1..{MAX_ORDER}, not {}", self.order));
+        }
+        if !(0.0..=1.0).contains(&self.light_error) {
+            return fail(format!("--light-error must lie within 0..1, not {}", self.light_error));
         }
         if !(0.5..=4.0).contains(&self.width_factor) {
             return fail(format!("the width factor must lie within 0.5..4, not {}", self.width_factor));

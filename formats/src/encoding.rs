@@ -4,9 +4,12 @@
 //! reference extinction κ̄ (the mean of the channels) as one of
 //!
 //! - ψ = exp(-κ̄m): the thesis' choice (section 3.3.1), the documented baseline;
-//! - 1/(κ̄m + ε): near a flat boundary this is a clamped cosine, which few bands capture, where ψ is almost a step.
+//! - τ = κ̄m;
+//! - 1/(κ̄m + ε): near a flat boundary this is a clamped cosine, which few bands capture, where ψ is almost a step;
+//! - the same, a lobe max(a·ω, 0) with one vector a for each sample taken out: the cosine of the nearest surface.
 //!
-//! Zero coefficients mean darkness in both.
+//! Values outside the range that makes sense stand for its ends, so that a fit to ψ is free there. Zero coefficients
+//! mean darkness in all but τ.
 
 use serde::{Deserialize, Serialize};
 
@@ -16,9 +19,16 @@ use serde::{Deserialize, Serialize};
 pub enum Encoding {
     /// ψ = exp(-τ).
     Transmittance,
+    /// τ.
+    Depth,
     /// 1/(τ + ε).
     Reciprocal {
         /// ε > 0 bounds the function where light enters at once.
+        epsilon: f32,
+    },
+    /// 1/(τ + ε) less a lobe for each sample.
+    Lobe {
+        /// As above.
         epsilon: f32,
     },
 }
@@ -26,12 +36,20 @@ pub enum Encoding {
 impl Encoding {
     /// The default: ε = 0.1.
     pub const RECIPROCAL: Self = Self::Reciprocal { epsilon: 0.1 };
+    /// The lobe with the same ε.
+    pub const LOBE: Self = Self::Lobe { epsilon: 0.1 };
 
-    /// The stored function's value for optical depth `tau` ≥ 0 at the reference extinction.
+    /// Whether a lobe is stored beside the harmonics.
+    pub fn has_lobe(self) -> bool {
+        matches!(self, Self::Lobe { .. })
+    }
+
+    /// The stored function's value (lobe included) for optical depth `tau` ≥ 0 at the reference extinction.
     pub fn encode(self, tau: f64) -> f64 {
         match self {
             Self::Transmittance => (-tau).exp(),
-            Self::Reciprocal { epsilon } => 1.0 / (tau + f64::from(epsilon)),
+            Self::Depth => tau,
+            Self::Reciprocal { epsilon } | Self::Lobe { epsilon } => 1.0 / (tau + f64::from(epsilon)),
         }
     }
 
@@ -46,7 +64,8 @@ impl Encoding {
                     (-value.ln()).max(0.0)
                 }
             }
-            Self::Reciprocal { epsilon } => {
+            Self::Depth => value.max(0.0),
+            Self::Reciprocal { epsilon } | Self::Lobe { epsilon } => {
                 if value <= 0.0 {
                     f32::INFINITY
                 } else {
@@ -63,7 +82,9 @@ mod tests {
 
     #[test]
     fn round_trip_and_clamps() {
-        for encoding in [Encoding::Transmittance, Encoding::RECIPROCAL] {
+        assert_eq!(Encoding::Depth.decode(-3.0), 0.0);
+        assert_eq!(Encoding::Depth.decode(Encoding::Depth.encode(2.5) as f32), 2.5);
+        for encoding in [Encoding::Transmittance, Encoding::RECIPROCAL, Encoding::LOBE] {
             for tau in [0.0, 1e-3, 0.5, 4.0, 12.0] {
                 let back = encoding.decode(encoding.encode(tau) as f32);
                 assert!((f64::from(back) - tau).abs() < 1e-4 * (1.0 + tau), "{encoding:?} {tau} {back}");

@@ -88,13 +88,16 @@ impl Chunk {
 
 impl Chunk {
     /// v of channel `c`, averaged over each kernel's weight along the ray, whose mean lies `mean` behind the closest
-    /// approach: v e^{rise + slope · mean + slope² / 4a²}, the last term for the weight's spread 1/2a².
+    /// approach: v e^{rise + slope · mean + slope² · variance / 2}, with the weight's variance 1/2a², or length²/12
+    /// where that is less.
     #[inline(always)]
-    fn source_at(&self, c: usize, mean: &Lanes) -> Lanes {
+    fn source_at(&self, c: usize, mean: &Lanes, length: &Lanes) -> Lanes {
         let mut out = [0.0; LANES];
         for (k, out) in out.iter_mut().enumerate() {
             let s = self.slope[c][k];
-            let exponent = self.rise[c][k] + s * (mean[k] + 0.25 * s / (self.a[k] * self.a[k]));
+            let (whole, part) = (0.25 / (self.a[k] * self.a[k]), length[k] * length[k] * (1.0 / 24.0));
+            let spread = if part < whole { part } else { whole };
+            let exponent = self.rise[c][k] + s * (mean[k] + s * spread);
             *out = self.source[c][k] * exp(exponent.clamp(-MOST_EXPONENT, MOST_EXPONENT));
         }
         out
@@ -106,6 +109,21 @@ struct Clipped {
     from: Lanes,
     length: Lanes,
     weight: Lanes,
+}
+
+impl Clipped {
+    /// The near and the far half of every support: where the density changes within one, each half has its own.
+    fn halves(&self) -> [Self; 2] {
+        let length = self.length.map(|l| 0.5 * l);
+        let mut middle = self.from;
+        for k in 0..LANES {
+            middle[k] += length[k];
+        }
+        [
+            Self { from: self.from, length, weight: self.weight },
+            Self { from: middle, length, weight: self.weight },
+        ]
+    }
 }
 
 /// Kernels along one ray. Reused from ray to ray.
@@ -161,25 +179,31 @@ impl Hits {
         let grey = kappa.x == kappa.y && kappa.y == kappa.z;
         let (mut numerator, mut denominator, mut splats) = ([[0.0; LANES]; 3], [[0.0; LANES]; 3], 0);
         for chunk in &self.chunks {
-            let clipped = clip(chunk, start, end);
-            let count = clipped.weight.iter().filter(|w| **w > 0.0).count();
+            let whole = clip(chunk, start, end);
+            let count = whole.weight.iter().filter(|w| **w > 0.0).count();
             if count == 0 {
                 continue;
             }
             splats += count as u32;
-            let path = Path::new(along, &clipped, start);
-            if grey {
-                let (w, mean) = path.weights(kappa.x, chunk, &clipped, end - start);
-                add(&mut denominator[0], &w);
-                for (c, sum) in numerator.iter_mut().enumerate() {
-                    add_product(sum, &w, &chunk.source_at(c, &mean));
+            let mut add_part = |clipped: &Clipped| {
+                let path = Path::new(along, clipped, start);
+                if grey {
+                    let (w, mean) = path.weights(kappa.x, chunk, clipped, end - start);
+                    add(&mut denominator[0], &w);
+                    for (c, sum) in numerator.iter_mut().enumerate() {
+                        add_product(sum, &w, &chunk.source_at(c, &mean, &clipped.length));
+                    }
+                } else {
+                    for c in 0..3 {
+                        let (w, mean) = path.weights(kappa[c], chunk, clipped, end - start);
+                        add(&mut denominator[c], &w);
+                        add_product(&mut numerator[c], &w, &chunk.source_at(c, &mean, &clipped.length));
+                    }
                 }
-            } else {
-                for c in 0..3 {
-                    let (w, mean) = path.weights(kappa[c], chunk, &clipped, end - start);
-                    add(&mut denominator[c], &w);
-                    add_product(&mut numerator[c], &w, &chunk.source_at(c, &mean));
-                }
+            };
+            match along {
+                Along::Uniform(_) => add_part(&whole),
+                Along::Profile(..) => whole.halves().iter().for_each(add_part),
             }
         }
         if grey {

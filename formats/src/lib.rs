@@ -17,6 +17,7 @@ pub mod encoding;
 pub mod error;
 pub mod files;
 pub mod fresnel;
+pub mod harmonics;
 pub mod hits;
 pub mod kernel;
 pub mod material;

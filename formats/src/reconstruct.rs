@@ -6,8 +6,8 @@
 //!
 //! A constant source comes out exactly. Within a kernel the source varies as its [`Source`] says; v_i above is its
 //! mean under the kernel's weight (see [`crate::hits`]). In a homogeneous medium W_i is the closed form of [`crate::kernel`] and
-//! A = 1 - e^{-κ(t1-t0)}. Otherwise a [`Profile`] of the density along the piece supplies τ at the ends of the
-//! kernel's support; between them τ is taken as linear, and σ is the mean scattering density there.
+//! A = 1 - e^{-κ(t1-t0)}. Otherwise a [`Profile`] of the density along the piece supplies τ at the ends and in the
+//! middle of the kernel's support; between them τ is taken as linear, and σ is the mean scattering density of each half.
 //! (The thesis sums v_i ∫γ_i dt alone, equation 3.4.)
 
 use crate::asset::{DensityGrid, Samples};
@@ -275,27 +275,36 @@ mod tests {
             let Some((from, to)) = kernel::clip(a, d2, tc, start, end) else {
                 continue;
             };
-            let (before, density, scattering) = match along {
-                Along::Uniform(_) => (from - start, 1.0, 1.0),
-                Along::Profile(_, p) => {
-                    let (first, last) = (p.at(from), p.at(to));
-                    let [slope, scattering] = [0, 1].map(|c| (last[c] - first[c]) / (to - from));
-                    (first[0], slope, scattering)
-                }
-            };
             let (Along::Uniform(kappa) | Along::Profile(kappa, _)) = along;
             let across = *centre - origin - direction * tc;
-            for c in 0..3 {
-                let k = kappa[c] * density;
-                let g = kernel::integral(a, d2, tc, k, from, to);
-                let w = cloud.weight[i] * scattering * (-kappa[c] * before).exp() * g;
-                let mean = kernel::mean_offset(a, d2, tc, k, from, to, g);
-                let slope = source[i].slope[c];
-                let along_ray = slope.dot(direction);
-                let exponent = -slope.dot(across) + along_ray * mean + 0.25 * along_ray * along_ray / (a * a);
-                let limit = crate::slopes::MOST_EXPONENT;
-                numerator[c] += source[i].value[c] * exponent.clamp(-limit, limit).exp() * w;
-                denominator[c] += w;
+            let middle = 0.5 * (from + to);
+            let parts = match along {
+                Along::Uniform(_) => vec![(from, to)],
+                Along::Profile(..) => vec![(from, middle), (middle, to)],
+            };
+            for (from, to) in parts {
+                let (before, density, scattering) = match along {
+                    Along::Uniform(_) => (from - start, 1.0, 1.0),
+                    Along::Profile(_, p) => {
+                        let (first, last) = (p.at(from), p.at(to));
+                        let [slope, scattering] = [0, 1].map(|c| (last[c] - first[c]) / (to - from));
+                        (first[0], slope, scattering)
+                    }
+                };
+                for c in 0..3 {
+                    let k = kappa[c] * density;
+                    let g = kernel::integral(a, d2, tc, k, from, to);
+                    let w = cloud.weight[i] * scattering * (-kappa[c] * before).exp() * g;
+                    let mean = kernel::mean_offset(a, d2, tc, k, from, to, g);
+                    let slope = source[i].slope[c];
+                    let along_ray = slope.dot(direction);
+                    let variance = (0.5 / (a * a)).min((to - from).powi(2) / 12.0);
+                    let exponent =
+                        -slope.dot(across) + along_ray * mean + 0.5 * along_ray * along_ray * variance;
+                    let limit = crate::slopes::MOST_EXPONENT;
+                    numerator[c] += source[i].value[c] * exponent.clamp(-limit, limit).exp() * w;
+                    denominator[c] += w;
+                }
             }
             splats += 1;
         }

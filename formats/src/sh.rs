@@ -4,10 +4,10 @@
 //! P̃_0^0 = √(1/4π), P̃_m^m = √((2m+1)/2m) P̃_{m-1}^{m-1}, P̃_l^m = a_lm (z P̃_{l-1}^m - b_lm P̃_{l-2}^m),
 //! a = √((4l²-1)/(l²-m²)), b = √(((l-1)²-m²)/(4(l-1)²-1)).  (Sloan 2008, "Stupid Spherical Harmonics Tricks"; the
 //! recurrences in thesis appendix A.1.)  "Order K" counts bands: l = 0..K-1, K² coefficients, index l(l+1)+m.
-//! Checked by: orthonormality to K = 10 and the addition theorem.
+//! Checked by: orthonormality to K = 14 and the addition theorem.
 
 /// Highest number of bands supported.
-pub const MAX_ORDER: usize = 10;
+pub const MAX_ORDER: usize = 14;
 
 /// Number of coefficients of `order` bands.
 pub const fn coefficient_count(order: usize) -> usize {
@@ -70,12 +70,33 @@ pub fn evaluate(order: usize, direction: [f64; 3], out: &mut [f64]) {
     }
 }
 
+/// The same constants in single precision.
+static NARROW: std::sync::LazyLock<Vec<[f32; 2]>> = std::sync::LazyLock::new(shader_table);
+
 /// The basis in single precision, as the player uses it.
+///
+/// # Panics
+/// As [`evaluate`].
 pub fn evaluate_f32(order: usize, direction: [f32; 3], out: &mut [f32]) {
-    let mut wide = [0.0; MAX_ORDER * MAX_ORDER];
-    evaluate(order, direction.map(f64::from), &mut wide);
-    for (o, w) in out.iter_mut().zip(&wide[..order * order]) {
-        *o = *w as f32;
+    let [x, y, z] = direction;
+    let table = &*NARROW;
+    let (mut cos_m, mut sin_m) = (1.0f32, 0.0f32);
+    for m in 0..order {
+        let scale = if m == 0 { 1.0 } else { std::f32::consts::SQRT_2 };
+        let (even, odd) = (scale * cos_m, scale * sin_m);
+        let (mut before, mut current) = (0.0, table[m * MAX_ORDER + m][0]);
+        for l in m..order {
+            if l > m {
+                let [a, b] = table[l * MAX_ORDER + m];
+                (before, current) = (current, a * (z * current - b * before));
+            }
+            let centre = l * (l + 1);
+            out[centre + m] = even * current;
+            if m > 0 {
+                out[centre - m] = odd * current;
+            }
+        }
+        (cos_m, sin_m) = (x * cos_m - y * sin_m, x * sin_m + y * cos_m);
     }
 }
 
@@ -118,19 +139,19 @@ mod tests {
     }
 
     #[test]
-    fn orthonormal_to_ten_bands() {
-        // A product of two basis functions has degree ≤ 18: 12 Gauss nodes in z and 24 even angles are exact.
+    fn orthonormal_to_the_last_band() {
+        // A product of two basis functions has degree ≤ 26: 14 Gauss nodes in z and 32 even angles are exact.
         let n = coefficient_count(MAX_ORDER);
         let mut gram = vec![0.0; n * n];
         let mut y = vec![0.0; n];
-        for (z, weight) in gauss_legendre(12) {
-            for k in 0..24 {
-                let angle = std::f64::consts::TAU * k as f64 / 24.0;
+        for (z, weight) in gauss_legendre(14) {
+            for k in 0..32 {
+                let angle = std::f64::consts::TAU * k as f64 / 32.0;
                 let r = (1.0 - z * z).sqrt();
                 evaluate(MAX_ORDER, [r * angle.cos(), r * angle.sin(), z], &mut y);
                 for i in 0..n {
                     for j in 0..n {
-                        gram[i * n + j] += weight * std::f64::consts::TAU / 24.0 * y[i] * y[j];
+                        gram[i * n + j] += weight * std::f64::consts::TAU / 32.0 * y[i] * y[j];
                     }
                 }
             }

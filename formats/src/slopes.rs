@@ -6,8 +6,17 @@
 //!   h_i = M⁻¹ Σ_j w_j d_j ln(v_j / v_i),   M = Σ_j w_j d_j d_jᵀ + ridge,   d_j = c_j - c_i,
 //!
 //! with c the centroids at which the values hold. The vectors M⁻¹ w_j d_j depend on the samples alone and are kept
-//! ([`Stencil`]); a frame only sums. |h| is limited to three times the extinction, beyond which no light fades.
-//! A [`Source`] then stands for v(x) = value · e^{h·(x-b)} around its kernel's centre b, which is always positive.
+//! ([`Stencil`]); a frame only sums. |h| is limited to six times the extinction: light at grazing angles fades faster
+//! than e^{-κ depth}. A [`Source`] then stands for v(x) = value · e^{h·(x-b)} around its kernel's centre b, which is
+//! always positive.
+//!
+//! What a sample stores is its mean over the inside part of a ball around b. The mean of an exponential is greater
+//! than its value at the centroid, by about e^{h·C·h/2} with C the covariance of the points; for a ball of radius R cut by a
+//! plane through its centre C = R²/5 - o oᵀ exactly, o = b - c. Both corrections are one exponent:
+//!
+//!   value = v̄ · exp(h·o - ½ s max(0, R²|h|²/5 - (h·o)²))
+//!
+//! with s = 1 for such means and 0 for values that were found at the centroid itself.
 
 use crate::asset::Samples;
 use glam::{Mat3, Vec3};
@@ -16,7 +25,9 @@ use rayon::prelude::*;
 /// Neighbours of a sample in the estimate of its slope.
 pub const NEIGHBOURS: usize = 14;
 /// Slopes are limited to this multiple of the largest extinction.
-pub const LIMIT: f32 = 3.0;
+pub const LIMIT: f32 = 6.0;
+/// Radius of the ball that a sample's values are the mean of, in disk radii.
+pub const CELL_RADIUS: f32 = 0.65;
 /// |ln| of the ratio between neighbours is limited to this, so that darkness has a finite slope.
 pub const MOST_RATIO: f32 = 6.0;
 /// |exponent| of a source's variation over its kernel is limited to this.
@@ -55,6 +66,8 @@ pub struct Stencil {
     pub centroid: Vec<Vec3>,
     /// Kernel centre minus centroid.
     pub to_centre: Vec<Vec3>,
+    /// Variance R²/5 of a whole cell along any axis.
+    pub variance: Vec<f32>,
     /// Largest slope of each sample, 1 / mesh unit.
     pub limit: Vec<f32>,
 }
@@ -75,17 +88,18 @@ impl Stencil {
         Self {
             spokes,
             to_centre: (0..n).map(|i| samples.position(i) - centroid[i]).collect(),
+            variance: samples.position_radius.iter().map(|p| (CELL_RADIUS * p[3]).powi(2) / 5.0).collect(),
             limit: centroid.par_iter().map(|c| (LIMIT * extinction(*c)).min(1e30)).collect(),
             centroid,
         }
     }
 
-    /// Sources from the values at the centroids.
-    pub fn sources(&self, values: &[Vec3]) -> Vec<Source> {
-        (0..values.len()).into_par_iter().with_min_len(256).map(|i| self.source(values, i)).collect()
+    /// Sources from the values at the centroids; `means` is s of the module's head.
+    pub fn sources(&self, values: &[Vec3], means: f32) -> Vec<Source> {
+        (0..values.len()).into_par_iter().with_min_len(256).map(|i| self.source(values, means, i)).collect()
     }
 
-    fn source(&self, values: &[Vec3], i: usize) -> Source {
+    fn source(&self, values: &[Vec3], means: f32, i: usize) -> Source {
         let own = values[i];
         let mut source = Source::flat(own);
         for c in 0..3 {
@@ -103,7 +117,9 @@ impl Stencil {
                 h *= self.limit[i] / length;
             }
             source.slope[c] = h;
-            source.value[c] *= h.dot(self.to_centre[i]).clamp(-MOST_EXPONENT, MOST_EXPONENT).exp();
+            let to_centre = h.dot(self.to_centre[i]);
+            let spread = (self.variance[i] * h.length_squared() - to_centre * to_centre).max(0.0);
+            source.value[c] *= (to_centre - 0.5 * means * spread).clamp(-MOST_EXPONENT, MOST_EXPONENT).exp();
         }
         source
     }
@@ -232,7 +248,7 @@ mod tests {
         let slope = [Vec3::new(2.0, -1.0, 0.5), Vec3::new(0.0, 3.0, 0.0), Vec3::ZERO];
         let values: Vec<Vec3> =
             (0..samples.len()).map(|i| Vec3::from(slope.map(|s| s.dot(samples.position(i)).exp()))).collect();
-        for source in stencil.sources(&values) {
+        for source in stencil.sources(&values, 0.0) {
             for (got, exact) in source.slope.iter().zip(slope) {
                 // The ridge shortens slopes by a few parts in a thousand.
                 assert!((*got - exact).length() < 0.03 * exact.length() + 1e-4, "{source:?}");
@@ -244,7 +260,7 @@ mod tests {
     fn any_number_of_samples() {
         for count in [0, 1, 2, 5, 30] {
             let stencil = Stencil::new(&samples(count), |_| 1.0);
-            let sources = stencil.sources(&vec![Vec3::new(1.0, 0.0, -1.0); count]);
+            let sources = stencil.sources(&vec![Vec3::new(1.0, 0.0, -1.0); count], 1.0);
             assert_eq!(sources.len(), count);
             assert!(sources.iter().all(|s| s.value.is_finite() && s.slope.iter().all(|h| h.is_finite())));
         }
@@ -256,6 +272,6 @@ mod tests {
         samples.position_radius.fill([0.5, 0.5, 0.5, 0.1]);
         let stencil = Stencil::new(&samples, |_| 1.0);
         let values: Vec<Vec3> = (0..20).map(|i| Vec3::splat(i as f32)).collect();
-        assert!(stencil.sources(&values).iter().flat_map(|s| s.slope).all(|h| h == Vec3::ZERO));
+        assert!(stencil.sources(&values, 0.0).iter().flat_map(|s| s.slope).all(|h| h == Vec3::ZERO));
     }
 }

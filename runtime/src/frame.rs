@@ -1,6 +1,7 @@
 //! One frame as plain data: camera and lights relative to the asset's centre, in f32, the same for both backends.
 
 use crate::Result;
+use crate::exact::ExactDepths;
 use diaphane_formats::asset::Info;
 use diaphane_formats::directions::even_directions;
 use diaphane_formats::scene::{Environment, Light, Scene, Surface};
@@ -142,6 +143,13 @@ impl Frame {
             surface: scene.surface,
             least_distance: (LEAST_DISTANCE * f64::from(info.diagonal())) as f32,
         })
+    }
+
+    /// Share of the lights that the baked means serve: the others have exact depths at the centroids.
+    pub fn share_of_means(&self, exact: Option<&ExactDepths>) -> f32 {
+        let count = self.lights.len();
+        let baked = (0..count).filter(|i| exact.and_then(|e| e.light(*i)).is_none()).count();
+        baked as f32 / count.max(1) as f32
     }
 
     /// Point and spot lights inside the asset's bounding box, by index: their baked depth runs past them.

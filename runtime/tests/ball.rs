@@ -4,6 +4,7 @@ mod support;
 
 use diaphane_formats::asset::Asset;
 use diaphane_formats::directions::subpixel_offsets;
+use diaphane_formats::harmonics::Coefficients;
 use diaphane_formats::phase::Phase;
 use diaphane_formats::scene::{Light, Scene};
 use diaphane_runtime::frame::Frame;
@@ -75,7 +76,7 @@ fn agrees_with_closed_form_single_scattering() {
 #[test]
 fn zeroed_coefficients_are_black() {
     let mut asset = ball(0.2, HERE, Phase::Isotropic);
-    asset.samples.depth.fill(0.0);
+    asset.samples.depth.codes.fill(0);
     let rendered = draw(&asset, &scene(HERE, 16, 4, side_light()), LightMode::Baked);
     assert!(rendered.picture.pixels.iter().flatten().all(|v| *v == 0.0));
     assert!(rendered.counters.rays_hit > 0 && rendered.counters.splats > 0);
@@ -150,8 +151,10 @@ fn reflection_adds_light_only_with_a_boundary() {
     let plain = draw(&asset, &scene, LightMode::Baked);
     assert_eq!(matched.picture, plain.picture);
     asset.info.ior = 1.5;
-    asset.samples.boundary = vec![0.0; asset.samples.depth.len()];
-    asset.samples.boundary.iter_mut().step_by(support::ORDER * support::ORDER).for_each(|c| *c = 3.5);
+    asset.info.boundary_order = 1;
+    let mut boundary = Coefficients::zeros(vec![1; asset.samples.len()]);
+    boundary.values.fill(3.5);
+    asset.samples.boundary = boundary.quantised();
     let dull = draw(&asset, &scene, LightMode::Baked);
     scene.surface.reflection = true;
     let shiny = draw(&asset, &scene, LightMode::Baked);

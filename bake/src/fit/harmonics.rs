@@ -1,185 +1,212 @@
-//! Spherical harmonics of the encoded optical depth, fitted to the transmittance itself.
+//! Spherical harmonics of the encoded optical depth, fitted to the transmittance itself, each sample with as few bands
+//! as it needs.
 //!
 //! The stored function y(ω) = Σ c_k Y_k(ω) is decoded to ψ̂ = exp(-τ(y)) at run time, so the coefficients minimise
-//! Σ_ω (ψ̂ - ψ)² by damped Gauss-Newton from a linear start whose weights are the slopes dψ/dy. The plain projection
-//! minimises the error of y instead, which matters most where no light comes from.
+//! Σ_ω (ψ̂ - ψ)² (see [`super::least_squares`]). The plain projection minimises the error of y instead, which matters
+//! most where no light comes from. Orders are tried upwards in steps of two until the error of ψ meets the target; each
+//! starts from the coefficients of the one before. What is kept is quantised ([`diaphane_formats::harmonics`]).
 
 use super::depths::Lit;
-use super::gauss_newton::{Basis, Solver};
+use super::least_squares::{BATCH, Batch};
 use crate::Result;
 use crate::params::Params;
 use crate::progress::Stage;
 use diaphane_formats::encoding::Encoding;
+use diaphane_formats::harmonics::{Coefficients, Harmonics};
 use diaphane_formats::sh::{coefficient_count, evaluate};
+use glam::{DVec3, Vec3};
+use half::f16;
+use ndarray::{Array2, Axis, Slice};
 use rayon::prelude::*;
 
-/// Coefficients of all samples, row-major [sample][coefficient].
-pub(crate) struct Harmonics {
-    pub depth: Vec<f32>,
-    pub boundary: Vec<f32>,
+/// The light of all samples.
+pub(crate) struct Light {
+    pub depth: Harmonics,
+    pub lobe: Vec<[f16; 3]>,
+    pub boundary: Harmonics,
 }
 
-const ITERATIONS: usize = 6;
-const DAMPING: f64 = 1e-4;
+/// Gauss-Newton steps of an order that may turn out too low, and of the last.
+const STEPS: [usize; 2] = [3, 8];
+/// Lowest order that is tried.
+const LEAST_ORDER: usize = 2;
+/// Bands of the boundary's transmittance, which varies little where light gets through.
+const BOUNDARY_ORDER: usize = 6;
+/// Samples of one task.
+const TASK: usize = 4 * BATCH;
 
-pub(crate) fn harmonics(lit: &Lit, params: &Params, stage: Stage<'_>) -> Result<Harmonics> {
-    let columns = coefficient_count(params.order);
-    let mut values = Vec::with_capacity(lit.directions.len() * columns);
-    let mut row = vec![0.0; columns];
-    for d in &lit.directions {
-        evaluate(params.order, d.to_array(), &mut row);
-        values.extend(row.iter().map(|v| *v as f32));
-    }
-    let basis = Basis { rows: lit.directions.len(), columns, values };
+/// One fitted sample.
+struct Fitted {
+    order: usize,
+    coefficients: Vec<f32>,
+    lobe: Vec3,
+}
+
+/// Bands of the boundary's transmittance at most `order`; 0 when index matched.
+pub(crate) fn boundary_order(ior: f64, order: usize) -> usize {
+    if ior == 1.0 { 0 } else { order.min(BOUNDARY_ORDER) }
+}
+
+pub(crate) fn harmonics(lit: &Lit, params: &Params, stage: Stage<'_>) -> Result<Light> {
     let n = lit.samples.len();
+    let columns = lit.directions.len();
     stage.announce(n);
-    let mut depth = vec![0.0f32; n * columns];
-    let mut boundary = vec![0.0f32; if lit.boundary.is_empty() { 0 } else { n * columns }];
-    let chunk = 256;
-    let fit_chunk = |index: usize, depth: &mut [f32], boundary: &mut [f32]| {
-        let mut fitter = Fitter::new(&basis, params.encoding);
-        for (k, out) in depth.chunks_exact_mut(columns).enumerate() {
-            let i = index * chunk + k;
-            fitter.fit_depth(&basis, &lit.transmittance[i * basis.rows..(i + 1) * basis.rows], out);
-            if let Some(out) = boundary.chunks_exact_mut(columns).nth(k) {
-                fitter.fit_boundary(&basis, &lit.boundary[i * basis.rows..(i + 1) * basis.rows], out);
-            }
-        }
-        stage.step(depth.len() / columns)
-    };
-    if boundary.is_empty() {
-        depth.par_chunks_mut(chunk * columns).enumerate().try_for_each(|(c, d)| fit_chunk(c, d, &mut []))?;
+    let basis = basis(&lit.directions, params.order);
+    let tasks: Vec<Vec<Fitted>> = lit
+        .transmittance
+        .par_chunks(TASK * columns)
+        .map(|psi| {
+            let fitted = fit(psi, lit, &basis, params);
+            stage.step(fitted.len())?;
+            Ok(fitted)
+        })
+        .collect::<Result<_>>()?;
+    let mut depth = Coefficients::zeros(tasks.iter().flatten().map(|f| f.order as u8).collect());
+    for (i, f) in tasks.iter().flatten().enumerate() {
+        depth.of_mut(i).copy_from_slice(&f.coefficients);
+    }
+    let half = |v: Vec3| v.to_array().map(f16::from_f32);
+    let lobe = if params.encoding.has_lobe() {
+        tasks.iter().flatten().map(|f| half(f.lobe)).collect()
     } else {
-        depth
-            .par_chunks_mut(chunk * columns)
-            .zip(boundary.par_chunks_mut(chunk * columns))
-            .enumerate()
-            .try_for_each(|(c, (d, b))| fit_chunk(c, d, b))?;
-    }
-    Ok(Harmonics { depth, boundary })
+        Vec::new()
+    };
+    Ok(Light { depth: depth.quantised(), lobe, boundary: boundary(lit, &basis, params) })
 }
 
-/// Buffers for fitting one sample after another.
-struct Fitter {
+fn basis(directions: &[DVec3], order: usize) -> Array2<f32> {
+    let mut out = Array2::zeros((directions.len(), coefficient_count(order)));
+    let mut row = vec![0.0; coefficient_count(order)];
+    for (d, mut out) in directions.iter().zip(out.rows_mut()) {
+        evaluate(order, d.to_array(), &mut row);
+        out.iter_mut().zip(&row).for_each(|(o, r)| *o = *r as f32);
+    }
+    out
+}
+
+/// Orders that are tried, upwards.
+fn ladder(highest: usize) -> Vec<usize> {
+    let mut orders: Vec<usize> = (LEAST_ORDER..=highest).rev().step_by(2).collect();
+    orders.reverse();
+    if orders.is_empty() { vec![highest] } else { orders }
+}
+
+/// Fits the samples of one task; `psi` holds their transmittances, row-major [sample][direction].
+fn fit(psi: &[f32], lit: &Lit, basis: &Array2<f32>, params: &Params) -> Vec<Fitted> {
+    let columns = lit.directions.len();
+    let count = psi.len() / columns;
+    let mut out: Vec<Fitted> =
+        (0..count).map(|_| Fitted { order: 0, coefficients: Vec::new(), lobe: Vec3::ZERO }).collect();
+    let mut open: Vec<usize> = (0..count).collect();
+    let orders = ladder(params.order);
+    for (k, order) in orders.iter().enumerate() {
+        let last = k + 1 == orders.len();
+        let mut still = Vec::new();
+        for group in open.chunks(BATCH) {
+            let rows = Array2::from_shape_fn((group.len(), columns), |(q, d)| psi[group[q] * columns + d]);
+            let steps = STEPS[usize::from(last)];
+            let fitted = fit_batch(&rows, group, &out, lit, basis, params.encoding, *order, steps);
+            for (q, (fitted, error)) in fitted.into_iter().enumerate() {
+                out[group[q]] = fitted;
+                if f64::from(error) > params.light_error {
+                    still.push(group[q]);
+                }
+            }
+        }
+        open = still;
+    }
+    out
+}
+
+/// Fits one batch at one order, from the coefficients of a lower one where there are any.
+#[expect(clippy::too_many_arguments, reason = "one call site, all of them different things")]
+fn fit_batch(
+    psi: &Array2<f32>,
+    group: &[usize],
+    before: &[Fitted],
+    lit: &Lit,
+    basis: &Array2<f32>,
     encoding: Encoding,
-    solver: Solver,
-    psi: Vec<f32>,
-    target: Vec<f32>,
-    slope: Vec<f32>,
-    value: Vec<f32>,
-    best: Vec<f32>,
-    trial: Vec<f32>,
+    order: usize,
+    steps: usize,
+) -> Vec<(Fitted, f32)> {
+    let n = coefficient_count(order);
+    let run = |lobe: Option<&Array2<f32>>| {
+        let batch = Batch { basis: basis.slice_axis(Axis(1), Slice::from(..n)), lobe };
+        let warm = lobe.is_none() && before[group[0]].order > 0;
+        let mut x = if warm {
+            Array2::from_shape_fn((group.len(), n), |(q, k)| {
+                before[group[q]].coefficients.get(k).copied().unwrap_or(0.0)
+            })
+        } else {
+            batch.start(encoding, psi)
+        };
+        // The transmittance itself is projected, as the thesis does.
+        let steps = if encoding == Encoding::Transmittance { 0 } else { steps };
+        let errors = batch.improve(encoding, psi, steps, &mut x);
+        (x, errors)
+    };
+    let (x, errors) = run(None);
+    let mut fitted: Vec<(Fitted, f32)> = (0..group.len())
+        .map(|q| {
+            let coefficients = x.row(q).iter().copied().collect();
+            (Fitted { order, coefficients, lobe: Vec3::ZERO }, errors[q])
+        })
+        .collect();
+    if encoding.has_lobe() {
+        let axes: Vec<Vec3> =
+            (0..group.len()).map(|q| brightest(psi.row(q).iter(), &lit.directions)).collect();
+        let lobe =
+            Array2::from_shape_fn(psi.dim(), |(q, d)| axes[q].dot(lit.directions[d].as_vec3()).max(0.0));
+        let (x, errors) = run(Some(&lobe));
+        for (q, slot) in fitted.iter_mut().enumerate() {
+            if x[[q, n]] > 0.0 && errors[q] < slot.1 {
+                let coefficients = x.row(q).iter().take(n).copied().collect();
+                *slot = (Fitted { order, coefficients, lobe: axes[q] * x[[q, n]] }, errors[q]);
+            }
+        }
+    }
+    fitted
 }
 
-impl Fitter {
-    fn new(basis: &Basis, encoding: Encoding) -> Self {
-        let zeros = |n: usize| vec![0.0f32; n];
-        Self {
-            encoding,
-            solver: Solver::new(basis),
-            psi: zeros(basis.rows),
-            target: zeros(basis.rows),
-            slope: zeros(basis.rows),
-            value: zeros(basis.rows),
-            best: zeros(basis.columns),
-            trial: zeros(basis.columns),
-        }
-    }
+/// The direction of the first moment of ψ: towards the nearest surface, where that is near.
+fn brightest<'a>(psi: impl Iterator<Item = &'a f32>, directions: &[DVec3]) -> Vec3 {
+    psi.zip(directions).map(|(psi, d)| f64::from(*psi) * *d).sum::<DVec3>().normalize_or_zero().as_vec3()
+}
 
-    /// ψ̂ and dψ̂/dy.
-    fn decode(&self, y: f32) -> (f32, f32) {
-        match self.encoding {
-            Encoding::Transmittance => (y.clamp(0.0, 1.0), 1.0),
-            Encoding::Reciprocal { epsilon } => {
-                if y <= 0.0 {
-                    return (0.0, 0.0);
-                }
-                let psi = (epsilon - 1.0 / y).exp();
-                if psi >= 1.0 { (1.0, 0.0) } else { (psi, psi / (y * y)) }
-            }
-        }
+/// Linear fit weighted by the transmittance of the medium: the boundary matters where light arrives.
+fn boundary(lit: &Lit, basis: &Array2<f32>, params: &Params) -> Harmonics {
+    if lit.boundary.is_empty() {
+        return Harmonics::default();
     }
+    let order = params.order.min(BOUNDARY_ORDER);
+    let (n, columns) = (coefficient_count(order), lit.directions.len());
+    let batch = Batch { basis: basis.slice_axis(Axis(1), Slice::from(..n)), lobe: None };
+    let rows: Vec<Vec<f32>> = lit
+        .boundary
+        .par_chunks(BATCH * columns)
+        .zip(lit.transmittance.par_chunks(BATCH * columns))
+        .map(|(through, psi)| {
+            let shape = (through.len() / columns, columns);
+            let weight = Array2::from_shape_fn(shape, |(q, d)| psi[q * columns + d] + 0.02);
+            let right = Array2::from_shape_fn(shape, |(q, d)| through[q * columns + d] * weight[[q, d]]);
+            batch.linear(&weight, &right, &vec![1e-4; shape.0]).iter().copied().collect()
+        })
+        .collect();
+    let mut out = Coefficients::zeros(vec![order as u8; lit.samples.len()]);
+    out.values = rows.concat();
+    out.quantised()
+}
 
-    fn error(&mut self, basis: &Basis, x: &[f32]) -> f32 {
-        let mut value = std::mem::take(&mut self.value);
-        basis.apply(x, &mut value);
-        let sum = value.iter().zip(&self.psi).map(|(y, psi)| (self.decode(*y).0 - psi).powi(2)).sum();
-        self.value = value;
-        sum
-    }
+#[cfg(test)]
+mod tests {
+    use super::ladder;
 
-    fn fit_depth(&mut self, basis: &Basis, transmittance: &[f32], out: &mut [f32]) {
-        for (d, psi) in transmittance.iter().enumerate() {
-            let tau = -psi.max(1e-30).ln();
-            self.psi[d] = *psi;
-            self.target[d] = self.encoding.encode(f64::from(tau)) as f32;
-            let slope = match self.encoding {
-                Encoding::Transmittance => 1.0,
-                Encoding::Reciprocal { epsilon } => self.psi[d] * (tau + epsilon) * (tau + epsilon),
-            };
-            self.slope[d] = slope + 0.02;
-        }
-        self.best.fill(0.0);
-        if !self.solver.solve(basis, &self.slope, &self.target, DAMPING, out) {
-            out.fill(0.0);
-            return;
-        }
-        if self.encoding == Encoding::Transmittance {
-            return;
-        }
-        self.best.copy_from_slice(out);
-        let mut least = self.error(basis, out);
-        let mut damping = DAMPING;
-        for _ in 0..ITERATIONS {
-            // self.value holds y at `best`. Where ψ̂ is clamped, a small slope keeps a wrong value movable.
-            for d in 0..basis.rows {
-                let y = self.value[d];
-                let (psi, slope) = self.decode(y);
-                let residual = self.psi[d] - psi;
-                let slope = slope.max(if residual.abs() > 1e-3 { 0.15 } else { 0.02 });
-                self.slope[d] = slope;
-                self.target[d] = y + residual / slope;
-            }
-            let mut trial = std::mem::take(&mut self.trial);
-            let solved = self.solver.solve(basis, &self.slope, &self.target, damping, &mut trial);
-            let error = if solved { self.error(basis, &trial) } else { f32::INFINITY };
-            self.trial = trial;
-            if error < least {
-                let gain = (least - error) / least.max(1e-20);
-                least = error;
-                self.best.copy_from_slice(&self.trial);
-                if gain < 5e-3 {
-                    break;
-                }
-            } else {
-                // A shorter step: halfway between.
-                for (t, b) in self.trial.iter_mut().zip(&self.best) {
-                    *t = 0.5 * (*t + b);
-                }
-                let trial = std::mem::take(&mut self.trial);
-                let error = self.error(basis, &trial);
-                self.trial = trial;
-                damping *= 10.0;
-                if error < least {
-                    least = error;
-                    self.best.copy_from_slice(&self.trial);
-                } else {
-                    let best = std::mem::take(&mut self.best);
-                    self.error(basis, &best);
-                    self.best = best;
-                }
-            }
-        }
-        out.copy_from_slice(&self.best);
-    }
-
-    /// Linear fit weighted by the transmittance of the medium: the boundary matters where light arrives.
-    fn fit_boundary(&mut self, basis: &Basis, through: &[f32], out: &mut [f32]) {
-        for d in 0..basis.rows {
-            self.slope[d] = self.psi[d] + 0.02;
-        }
-        if !self.solver.solve(basis, &self.slope, through, DAMPING, out) {
-            out.fill(0.0);
-        }
+    #[test]
+    fn orders_end_at_the_highest() {
+        assert_eq!(ladder(1), [1]);
+        assert_eq!(ladder(2), [2]);
+        assert_eq!(ladder(7), [3, 5, 7]);
+        assert_eq!(ladder(10), [2, 4, 6, 8, 10]);
     }
 }

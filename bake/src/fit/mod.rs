@@ -2,10 +2,10 @@
 
 mod cells;
 mod depths;
-mod gauss_newton;
 mod harmonics;
+mod least_squares;
 mod weights;
 
 pub(crate) use depths::{Lit, depths};
-pub(crate) use harmonics::{Harmonics, harmonics};
+pub(crate) use harmonics::{Light, boundary_order, harmonics};
 pub(crate) use weights::weights;

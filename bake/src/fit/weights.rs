@@ -10,6 +10,7 @@ use crate::progress::Stage;
 use diaphane_formats::kernel;
 use diaphane_formats::reconstruct::Cloud;
 use glam::Vec3;
+use half::f16;
 use rayon::prelude::*;
 
 const ITERATIONS: usize = 60;
@@ -111,5 +112,6 @@ pub(crate) fn weights(lit: &Lit, params: &Params, stage: Stage<'_>) -> Result<Ve
         }
         stage.step(1)?;
     }
-    Ok(w)
+    // As the asset stores them.
+    Ok(w.into_iter().map(|w| f16::from_f32(w.min(65504.0)).to_f32()).collect())
 }

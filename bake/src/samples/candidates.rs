@@ -15,12 +15,16 @@ use rayon::prelude::*;
 
 /// Candidates for each wanted sample.
 const OVERSAMPLING: usize = 16;
+/// Candidates on the boundary for each disk that finds a place there, roughly.
+const SURFACE_CANDIDATES: f64 = 12.0;
 /// Usable candidates for each wanted sample that end the drawing.
 const ENOUGH: usize = 10;
 /// Draws at the most.
 const ROUNDS: u64 = 8;
 
 pub(super) struct Drawn {
+    /// On the boundary: offered before all others, so that the layer where light enters and leaves has no gaps.
+    pub surface: Vec<Candidate>,
     pub list: Vec<Candidate>,
     pub dark: usize,
 }
@@ -52,7 +56,7 @@ pub(super) fn draw(
         cumulative.push(total);
     }
     if !(total > 0.0) {
-        return Ok(Drawn { list: Vec::new(), dark: 0 });
+        return Ok(Drawn { surface: Vec::new(), list: Vec::new(), dark: 0 });
     }
     let wanted = OVERSAMPLING * params.samples + 64;
     let one = |seed: u64, i: usize| {
@@ -96,7 +100,51 @@ pub(super) fn draw(
         list.iter().enumerate().map(|(i, c)| (hash(hash(params.seed, 29), i as u64), *c)).collect();
     order.sort_unstable_by_key(|(key, _)| *key);
     let fill = usable(shape, medium, &fill(shape, &list, layers))?;
-    Ok(Drawn { list: order.into_iter().map(|(_, c)| c).chain(fill).collect(), dark })
+    let surface =
+        usable(shape, medium, &surface(shape, layers, fluence, medium, &relative_radius, params.seed))?;
+    Ok(Drawn { surface, list: order.into_iter().map(|(_, c)| c).chain(fill).collect(), dark })
+}
+
+/// Candidates on the boundary: on the first layer in proportion to 1/radius², moved onto the mesh.
+fn surface(
+    shape: &Shape<'_>,
+    layers: &[Layer],
+    fluence: &LayerFluence,
+    medium: &Medium,
+    relative_radius: &(impl Fn(f64) -> f64 + Sync),
+    seed: u64,
+) -> Vec<Candidate> {
+    let Some(layer) = layers.first() else { return Vec::new() };
+    let light = |corners: &[u32; 3], bary: [f64; 3]| -> f64 {
+        bary.iter().zip(corners).map(|(b, v)| b * f64::from(fluence.top[0][*v as usize])).sum()
+    };
+    let mut cumulative = Vec::with_capacity(layer.triangles.len());
+    let mut total = 0.0;
+    for corners in &layer.triangles {
+        let [a, b, c] = corners.map(|v| layer.positions[v as usize]);
+        let rho = medium.density((a + b + c) / 3.0);
+        let radius = relative_radius(rho * light(corners, [1.0 / 3.0; 3])) * shape.spacing;
+        total += 0.5 * (b - a).cross(c - a).length() / (radius * radius);
+        cumulative.push(total);
+    }
+    let count = (SURFACE_CANDIDATES * total).min(1e8) as usize;
+    (0..count)
+        .into_par_iter()
+        .filter_map(|i| {
+            let mut rng = Pcg64Mcg::seed_from_u64(hash(hash(seed, 41), i as u64));
+            let mass = rng.random::<f64>() * total;
+            let t = cumulative.partition_point(|c| *c <= mass).min(cumulative.len() - 1);
+            let corners = &layer.triangles[t];
+            let bary = barycentric(rng.random(), rng.random());
+            let p: DVec3 = bary.iter().zip(corners).map(|(b, v)| layer.positions[*v as usize] * *b).sum();
+            let nearest = shape.accel.nearest(p, 2.0 * shape.grid.cell)?;
+            let inward = (p - nearest.point).try_normalize().unwrap_or(-shape.accel.normal(nearest.triangle));
+            let position = nearest.point + inward * (1e-5 * shape.diagonal);
+            let fluence = light(corners, bary);
+            let radius = relative_radius(medium.density(position) * fluence);
+            Some(Candidate { position, radius, fluence })
+        })
+        .collect()
 }
 
 fn patches(layers: &[Layer], fluence: &LayerFluence, medium: &Medium) -> Vec<Patch> {

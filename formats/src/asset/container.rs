@@ -29,13 +29,13 @@ const MAX_SECTIONS: usize = 64;
 pub(super) enum Kind {
     /// Metadata (see `codec`).
     Info = 1,
-    /// f32 × 4: position, radius.
-    PositionRadius = 2,
-    /// f32.
+    /// u16 × 3: position in the bounding box; f16: radius.
+    Place = 2,
+    /// f16.
     Weight = 3,
-    /// f16 × order².
+    /// Codes of the depth's harmonics.
     Depth = 4,
-    /// f16 × order².
+    /// Codes of the boundary's harmonics.
     Boundary = 5,
     /// f32 × 3.
     MeshPositions = 6,
@@ -43,18 +43,33 @@ pub(super) enum Kind {
     MeshTriangles = 7,
     /// u32 × 3 size, f32 × 6 bounds, then f16 × 2 a voxel.
     Density = 8,
-    /// i8 × 4: from the position to the centroid.
+    /// i8 × 3: from the position to the centroid; u8: order of the depth's harmonics.
     Offset = 9,
+    /// f16: scale of the depth's harmonics.
+    DepthScale = 10,
+    /// f16: scale of the boundary's harmonics.
+    BoundaryScale = 11,
+    /// f32 a band: profile of the depth's harmonics.
+    DepthProfile = 12,
+    /// f32 a band: profile of the boundary's harmonics.
+    BoundaryProfile = 13,
+    /// f16 × 3: lobe.
+    Lobe = 14,
 }
 
 impl Kind {
-    pub(super) const ALL: [(Self, &'static str); 9] = [
+    pub(super) const ALL: [(Self, &'static str); 14] = [
         (Self::Info, "info"),
-        (Self::PositionRadius, "position_radius"),
+        (Self::Place, "place"),
         (Self::Offset, "offset"),
         (Self::Weight, "weight"),
         (Self::Depth, "depth"),
+        (Self::DepthScale, "depth_scale"),
+        (Self::DepthProfile, "depth_profile"),
+        (Self::Lobe, "lobe"),
         (Self::Boundary, "boundary"),
+        (Self::BoundaryScale, "boundary_scale"),
+        (Self::BoundaryProfile, "boundary_profile"),
         (Self::MeshPositions, "mesh_positions"),
         (Self::MeshTriangles, "mesh_triangles"),
         (Self::Density, "density"),

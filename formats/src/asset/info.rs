@@ -49,8 +49,12 @@ pub struct Info {
     pub samples: u64,
     /// Candidates that were dropped because almost no light reaches them.
     pub discarded: u64,
-    /// Bands of the spherical harmonics.
+    /// Most bands of a sample's spherical harmonics.
     pub order: u32,
+    /// Error of the transmittance (root mean square over directions) at which a sample gets no more bands.
+    pub light_error: f64,
+    /// Bands of the boundary's spherical harmonics; 0 when index matched.
+    pub boundary_order: u32,
     /// What the coefficients mean.
     pub encoding: Encoding,
     /// κ̄: optical depths are encoded for this extinction.
@@ -70,6 +74,12 @@ impl Info {
         if !(1..=MAX_ORDER as u32).contains(&self.order) {
             return fail("spherical-harmonics order");
         }
+        if (self.ior != 1.0) != (1..=MAX_ORDER as u32).contains(&self.boundary_order) {
+            return fail("boundary's spherical-harmonics order");
+        }
+        if !(self.light_error >= 0.0) {
+            return fail("light error");
+        }
         if !(self.width_factor > 0.0 && self.width_factor.is_finite()) {
             return fail("width factor");
         }
@@ -82,7 +92,7 @@ impl Info {
         if self.centre.iter().any(|c| !c.is_finite()) {
             return fail("centre");
         }
-        if let Encoding::Reciprocal { epsilon } = self.encoding
+        if let Encoding::Reciprocal { epsilon } | Encoding::Lobe { epsilon } = self.encoding
             && !(epsilon > 0.0 && epsilon.is_finite())
         {
             return fail("encoding");

@@ -6,22 +6,24 @@
 mod codec;
 mod container;
 mod info;
+mod places;
 mod read;
 mod write;
 
 pub use info::{Info, Provenance};
+pub use places::Places;
 pub use read::{parse, read, section_sizes};
 pub use write::{encode, write};
 
+use crate::harmonics::Harmonics;
 use crate::medium::{Density, Grid, Medium};
 use crate::mesh::Mesh;
-use crate::sh::coefficient_count;
 use crate::{Error, Result};
 use glam::{DVec3, Vec3};
 use half::f16;
 
 /// Version of the file format that this build writes and reads.
-pub const FORMAT_VERSION: u32 = 1;
+pub const FORMAT_VERSION: u32 = 2;
 
 /// A baked object.
 #[derive(Clone, Debug, PartialEq)]
@@ -41,16 +43,19 @@ pub struct Asset {
 /// Samples as parallel arrays of equal length.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Samples {
-    /// Position relative to the centre, and Poisson-disk radius, mesh units.
+    /// Position relative to the centre (stored as [`Places`] do), and Poisson-disk radius (an f16), mesh units.
     pub position_radius: Vec<[f32; 4]>,
     /// Where the values hold: (centroid - position) · 127 / radius, and a zero.
     pub offset: Vec<[i8; 4]>,
-    /// Partition-of-unity weight of the kernel, ≥ 0.
+    /// Partition-of-unity weight of the kernel, ≥ 0; an f16.
     pub weight: Vec<f32>,
-    /// Spherical-harmonics coefficients of the encoded optical depth, `order`² for each sample.
-    pub depth: Vec<f32>,
-    /// Coefficients of the boundary's Fresnel transmittance product, as `depth`; empty when index matched.
-    pub boundary: Vec<f32>,
+    /// Spherical harmonics of the encoded optical depth, each sample with its own order.
+    pub depth: Harmonics,
+    /// Vector a of the lobe max(a·ω, 0) that is added to them; empty unless the encoding has lobes.
+    pub lobe: Vec<[f16; 3]>,
+    /// Spherical harmonics of the boundary's Fresnel transmittance product, all of
+    /// [`Info::boundary_order`]; empty when index matched.
+    pub boundary: Harmonics,
 }
 
 impl Samples {
@@ -124,24 +129,24 @@ impl Asset {
     pub fn validate(&self) -> Result<()> {
         self.info.validate()?;
         let n = self.samples.len();
-        let k = coefficient_count(self.info.order as usize);
         let fail = |what: &str| Err(Error::invalid(format!("the asset's {what} do not fit together")));
-        if self.info.samples as usize != n
-            || self.samples.weight.len() != n
-            || self.samples.offset.len() != n
-            || self.samples.depth.len() != n * k
-        {
+        let s = &self.samples;
+        if self.info.samples as usize != n || s.weight.len() != n || s.offset.len() != n {
             return fail("sample sections");
         }
-        let boundary = if self.info.ior == 1.0 { 0 } else { n * k };
-        if self.samples.boundary.len() != boundary {
-            return fail("boundary coefficients");
+        s.depth.validate(n, self.info.order as usize, "depth coefficients")?;
+        if s.lobe.len() != if self.info.encoding.has_lobe() { n } else { 0 } {
+            return fail("lobes");
+        }
+        let boundary = if self.info.ior == 1.0 { 0 } else { n };
+        s.boundary.validate(boundary, self.info.boundary_order as usize, "boundary coefficients")?;
+        if s.boundary.order.iter().any(|k| u32::from(*k) != self.info.boundary_order) {
+            return fail("boundary orders");
         }
         let finite = |values: &[f32]| values.iter().all(|v| v.is_finite());
-        if !self.samples.position_radius.iter().all(|p| finite(p) && p[3] > 0.0)
-            || !self.samples.weight.iter().all(|w| w.is_finite() && *w >= 0.0)
-            || !finite(&self.samples.depth)
-            || !finite(&self.samples.boundary)
+        if !s.position_radius.iter().all(|p| finite(p) && p[3] > 0.0)
+            || !s.weight.iter().all(|w| w.is_finite() && *w >= 0.0)
+            || !s.lobe.iter().flatten().all(|v| v.is_finite())
         {
             return fail("sample values");
         }

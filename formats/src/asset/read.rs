@@ -1,7 +1,8 @@
 //! Bytes to asset. Survives any byte string; allocates no more than a small multiple of the file's size.
 
 use super::container::{self, Kind, Section};
-use super::{Asset, DensityGrid, FORMAT_VERSION, Samples, codec};
+use super::{Asset, DensityGrid, FORMAT_VERSION, Info, Places, Samples, codec};
+use crate::harmonics::Harmonics;
 use crate::{Error, Result, files};
 use half::f16;
 use std::path::Path;
@@ -21,15 +22,36 @@ pub fn parse(bytes: &[u8]) -> Result<Asset> {
     let need = |kind: Kind| {
         find(kind)?.ok_or_else(|| Error::invalid(format!("the asset lacks its section {}", kind as u32)))
     };
+    let info: Info = codec::decode(need(Kind::Info)?)?;
+    let places = Places::new(info.bounds);
+    let (offset, order): (Vec<[i8; 4]>, Vec<u8>) = groups(need(Kind::Offset)?)?
+        .into_iter()
+        .map(|[x, y, z, order]: [u8; 4]| ([x as i8, y as i8, z as i8, 0], order))
+        .unzip();
+    let halves_of = |kind: Kind| find(kind)?.map_or(Ok(Vec::new()), halves);
+    let floats_of = |kind: Kind| find(kind)?.map_or(Ok(Vec::new()), floats);
+    let boundary_scale = halves_of(Kind::BoundaryScale)?;
+    let boundary_order = u8::try_from(info.boundary_order).unwrap_or(u8::MAX);
     let asset = Asset {
-        info: codec::decode(need(Kind::Info)?)?,
         samples: Samples {
-            position_radius: groups(&floats(need(Kind::PositionRadius)?)?)?,
-            offset: groups(&signed(need(Kind::Offset)?))?,
-            weight: floats(need(Kind::Weight)?)?,
-            depth: halves(need(Kind::Depth)?)?,
-            boundary: find(Kind::Boundary)?.map_or(Ok(Vec::new()), halves)?,
+            position_radius: place(need(Kind::Place)?, &places)?,
+            offset,
+            weight: halves(need(Kind::Weight)?)?.into_iter().map(f16::to_f32).collect(),
+            depth: Harmonics {
+                order,
+                scale: halves(need(Kind::DepthScale)?)?,
+                profile: floats(need(Kind::DepthProfile)?)?,
+                codes: need(Kind::Depth)?.to_vec(),
+            },
+            lobe: groups(&halves_of(Kind::Lobe)?)?,
+            boundary: Harmonics {
+                order: vec![boundary_order; boundary_scale.len()],
+                scale: boundary_scale,
+                profile: floats_of(Kind::BoundaryProfile)?,
+                codes: find(Kind::Boundary)?.map_or(Vec::new(), <[u8]>::to_vec),
+            },
         },
+        info,
         mesh_positions: groups(&floats(need(Kind::MeshPositions)?)?)?,
         mesh_triangles: groups(&words(need(Kind::MeshTriangles)?)?)?,
         density: find(Kind::Density)?.map(density).transpose()?,
@@ -66,8 +88,14 @@ fn words(bytes: &[u8]) -> Result<Vec<u32>> {
     Ok(chunks.iter().map(|c| u32::from_le_bytes(*c)).collect())
 }
 
-fn signed(bytes: &[u8]) -> Vec<i8> {
-    bytes.iter().map(|b| *b as i8).collect()
+fn place(bytes: &[u8], places: &Places) -> Result<Vec<[f32; 4]>> {
+    let (chunks, []) = bytes.as_chunks::<8>() else { return Err(ragged()) };
+    let word = |c: &[u8; 8], k: usize| u16::from_le_bytes([c[2 * k], c[2 * k + 1]]);
+    let one = |c: &[u8; 8]| {
+        let [x, y, z] = places.position([0, 1, 2].map(|k| word(c, k))).to_array();
+        [x, y, z, places.radius(f16::from_bits(word(c, 3)))]
+    };
+    Ok(chunks.iter().map(one).collect())
 }
 
 fn floats(bytes: &[u8]) -> Result<Vec<f32>> {
@@ -75,9 +103,9 @@ fn floats(bytes: &[u8]) -> Result<Vec<f32>> {
     Ok(chunks.iter().map(|c| f32::from_le_bytes(*c)).collect())
 }
 
-fn halves(bytes: &[u8]) -> Result<Vec<f32>> {
+fn halves(bytes: &[u8]) -> Result<Vec<f16>> {
     let (chunks, []) = bytes.as_chunks::<2>() else { return Err(ragged()) };
-    Ok(chunks.iter().map(|c| f16::from_le_bytes(*c).to_f32()).collect())
+    Ok(chunks.iter().map(|c| f16::from_le_bytes(*c)).collect())
 }
 
 fn groups<T: Copy, const N: usize>(values: &[T]) -> Result<Vec<[T; N]>> {

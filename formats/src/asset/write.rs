@@ -1,8 +1,9 @@
 //! Asset to bytes.
 
 use super::container::{self, Kind};
-use super::{Asset, FORMAT_VERSION, codec};
+use super::{Asset, FORMAT_VERSION, Places, codec};
 use crate::{Result, files};
+use glam::Vec3;
 use half::f16;
 use std::path::Path;
 
@@ -12,21 +13,33 @@ use std::path::Path;
 /// Parts that do not fit together.
 pub fn encode(asset: &Asset) -> Result<Vec<u8>> {
     asset.validate()?;
-    let halves = |values: &[f32]| -> Vec<u8> {
-        values.iter().flat_map(|v| f16::from_f32(v.clamp(-65504.0, 65504.0)).to_le_bytes()).collect()
-    };
+    let halves = |values: &[f16]| -> Vec<u8> { values.iter().flat_map(|v| v.to_le_bytes()).collect() };
     let floats =
         |values: &mut dyn Iterator<Item = f32>| -> Vec<u8> { values.flat_map(f32::to_le_bytes).collect() };
     let s = &asset.samples;
+    let places = Places::new(asset.info.bounds);
+    let place = |p: &[f32; 4]| {
+        let [x, y, z] = places.code(Vec3::new(p[0], p[1], p[2]).as_dvec3());
+        [x, y, z, places.radius_code(f64::from(p[3])).to_bits()].map(u16::to_le_bytes)
+    };
+    let offset = |(o, order): (&[i8; 4], &u8)| [o[0] as u8, o[1] as u8, o[2] as u8, *order];
+    let weight: Vec<f16> = s.weight.iter().map(|w| f16::from_f32(*w)).collect();
     let mut sections = vec![
         (Kind::Info, codec::encode(&asset.info)?),
-        (Kind::PositionRadius, floats(&mut s.position_radius.iter().flatten().copied())),
-        (Kind::Offset, s.offset.iter().flatten().map(|v| *v as u8).collect()),
-        (Kind::Weight, floats(&mut s.weight.iter().copied())),
-        (Kind::Depth, halves(&s.depth)),
+        (Kind::Place, s.position_radius.iter().flat_map(place).flatten().collect()),
+        (Kind::Offset, s.offset.iter().zip(&s.depth.order).flat_map(offset).collect()),
+        (Kind::Weight, halves(&weight)),
+        (Kind::DepthProfile, floats(&mut s.depth.profile.iter().copied())),
+        (Kind::DepthScale, halves(&s.depth.scale)),
+        (Kind::Depth, s.depth.codes.clone()),
     ];
+    if !s.lobe.is_empty() {
+        sections.push((Kind::Lobe, halves(s.lobe.as_flattened())));
+    }
     if !s.boundary.is_empty() {
-        sections.push((Kind::Boundary, halves(&s.boundary)));
+        sections.push((Kind::BoundaryProfile, floats(&mut s.boundary.profile.iter().copied())));
+        sections.push((Kind::BoundaryScale, halves(&s.boundary.scale)));
+        sections.push((Kind::Boundary, s.boundary.codes.clone()));
     }
     sections.push((Kind::MeshPositions, floats(&mut asset.mesh_positions.iter().flatten().copied())));
     sections.push((

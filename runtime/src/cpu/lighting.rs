@@ -6,7 +6,8 @@
 //!
 //! v is in-scattered radiance per unit of κt dt, albedo included; with its slopes ([`diaphane_formats::slopes`]) it is
 //! the source of [`diaphane_formats::reconstruct`].
-//! ψ = exp(-κ/κ̄ · τ̄) with τ̄ decoded from the sample's spherical harmonics (κ̄ = 0: ψ = 1); β is the boundary's
+//! ψ = exp(-κ/κ̄ · τ̄) with τ̄ decoded from the sample's spherical harmonics and lobe (κ̄ = 0: ψ = 1); bands that a sample
+//! does not have cost nothing. β is the boundary's
 //! Fresnel transmittance from its own coefficients, clamped to 0..1 (index matched: 1). A table of exact depths m
 //! gives ψ = exp(-κ m) and β instead. Lights that do not reach the sample (outside a spot's cone) are skipped.
 
@@ -14,12 +15,13 @@ use crate::exact::ExactDepths;
 use crate::frame::{Frame, FrameLight, LightKind};
 use diaphane_formats::asset::{Asset, Samples};
 use diaphane_formats::encoding::Encoding;
-use diaphane_formats::sh::{self, MAX_ORDER};
+use diaphane_formats::harmonics::Coefficients;
+use diaphane_formats::sh::{self, MAX_ORDER, coefficient_count};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 /// What the lighting pass needs of an asset beside the samples themselves.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Lighting {
     /// κ at density 1, per channel.
     extinction: Vec3,
@@ -29,7 +31,13 @@ pub struct Lighting {
     /// Mean cosine of the phase function.
     g: f32,
     encoding: Encoding,
+    /// Highest order of any sample.
     order: usize,
+    depth: Coefficients,
+    /// Empty unless the encoding has lobes.
+    lobe: Vec<Vec3>,
+    /// Empty when index matched.
+    boundary: Coefficients,
 }
 
 /// A light with the basis of its direction, where that is the same for all samples.
@@ -51,7 +59,10 @@ impl Lighting {
             albedo: DVec3::from(info.albedo).as_vec3(),
             g: info.phase.mean_cosine() as f32,
             encoding: info.encoding,
-            order: info.order as usize,
+            order: info.order.max(info.boundary_order) as usize,
+            depth: asset.samples.depth.decoded(),
+            lobe: asset.samples.lobe.iter().map(|a| Vec3::from(a.map(|v| v.to_f32()))).collect(),
+            boundary: asset.samples.boundary.decoded(),
         }
     }
 
@@ -79,7 +90,7 @@ impl Lighting {
     ) -> Prepared<'a> {
         let table = exact.and_then(|e| e.light(index)).filter(|t| t.len() == samples.len());
         let basis = (light.kind == LightKind::Directional).then(|| {
-            let mut basis = vec![0.0; self.order * self.order];
+            let mut basis = vec![0.0; coefficient_count(self.order)];
             sh::evaluate_f32(self.order, (-light.direction).to_array(), &mut basis);
             basis
         });
@@ -89,9 +100,9 @@ impl Lighting {
     fn source(&self, samples: &Samples, i: usize, frame: &Frame, lights: &[Prepared]) -> Vec3 {
         let place = samples.centroid(i);
         let towards_camera = (frame.view.origin - place).normalize_or_zero();
-        let count = self.order * self.order;
-        let depth = &samples.depth[i * count..(i + 1) * count];
-        let boundary = samples.boundary.get(i * count..(i + 1) * count);
+        // Only the bands that this sample has.
+        let boundary_order = self.boundary.order.get(i).copied().unwrap_or(0);
+        let order = usize::from(self.depth.order[i].max(boundary_order));
         let mut scratch = [0.0; MAX_ORDER * MAX_ORDER];
         let mut sum = Vec3::ZERO;
         for prepared in lights {
@@ -108,11 +119,11 @@ impl Lighting {
                     let basis: &[f32] = match &prepared.basis {
                         Some(basis) => basis,
                         None => {
-                            sh::evaluate_f32(self.order, to.to_array(), &mut scratch);
-                            &scratch[..count]
+                            sh::evaluate_f32(order, to.to_array(), &mut scratch);
+                            &scratch
                         }
                     };
-                    self.arriving(depth, boundary, basis)
+                    self.arriving(i, to, basis)
                 }
             };
             sum += irradiance * arriving * henyey_greenstein(self.g, -to.dot(towards_camera));
@@ -120,13 +131,15 @@ impl Lighting {
         sum * self.albedo
     }
 
-    /// ψ β from the coefficients, per channel, 0..1.
-    fn arriving(&self, depth: &[f32], boundary: Option<&[f32]>, basis: &[f32]) -> Vec3 {
-        let through = boundary.map_or(1.0, |b| dot(b, basis).clamp(0.0, 1.0));
+    /// ψ β of sample `i` in direction `to`, per channel, 0..1.
+    fn arriving(&self, i: usize, to: Vec3, basis: &[f32]) -> Vec3 {
+        let through =
+            if self.boundary.is_empty() { 1.0 } else { dot(self.boundary.of(i), basis).clamp(0.0, 1.0) };
         let Some(ratio) = self.ratio else {
             return Vec3::splat(through);
         };
-        let tau = self.encoding.decode(dot(depth, basis));
+        let lobe = self.lobe.get(i).map_or(0.0, |a| a.dot(to).max(0.0));
+        let tau = self.encoding.decode(dot(self.depth.of(i), basis) + lobe);
         if tau == f32::INFINITY || through == 0.0 {
             return Vec3::ZERO;
         }
@@ -140,8 +153,9 @@ fn henyey_greenstein(g: f32, cosine: f32) -> f32 {
     (1.0 - g * g) / (4.0 * std::f32::consts::PI * base * base.sqrt())
 }
 
-/// Four running sums keep the additions independent of each other.
+/// Over the length of `a`; four running sums keep the additions independent of each other.
 fn dot(a: &[f32], b: &[f32]) -> f32 {
+    let b = &b[..a.len()];
     let mut sums = [0.0f32; 4];
     let ((head_a, tail_a), (head_b, tail_b)) = (a.as_chunks::<4>(), b.as_chunks::<4>());
     for (x, y) in head_a.iter().zip(head_b) {

@@ -71,7 +71,8 @@ impl CpuRenderer {
 
     /// The source of every sample under the frame's lights, see [`lighting`].
     pub fn sources(&self, frame: &Frame, exact: Option<&ExactDepths>) -> Vec<Source> {
-        self.stencil.sources(&self.lighting.values(&self.samples, frame, exact))
+        let values = self.lighting.values(&self.samples, frame, exact);
+        self.stencil.sources(&values, frame.share_of_means(exact))
     }
 
     /// Draws a frame.

@@ -15,6 +15,7 @@ mod bindings;
 mod device;
 mod headless;
 mod neighbours;
+mod packed;
 mod passes;
 mod pipeline;
 mod readback;

@@ -114,7 +114,8 @@ impl Pipeline {
     ) {
         let mut views = Vec::with_capacity(tiles.len() * offsets.len());
         for &tile in tiles {
-            let view = |(&offset, rays)| ViewUniform::new(frame, self.asset.diagonal, tile, offset, rays);
+            let (diagonal, means) = (self.asset.diagonal, self.frame.means);
+            let view = |(&offset, rays)| ViewUniform::new(frame, diagonal, tile, offset, rays, means);
             views.extend(offsets.iter().zip(before + 1..).map(view));
         }
         self.frame.write_views(device, queue, &self.common, &self.asset, &views);

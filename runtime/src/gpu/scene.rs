@@ -2,6 +2,7 @@
 
 use super::bindings::{Slot, empty_buffer, filled_buffer, group, layout};
 use super::neighbours::neighbours;
+use super::packed;
 use super::uniforms::{LightRecord, MediumUniform, ViewUniform};
 use crate::cpu::surface::corner_normals;
 use crate::exact::ExactDepths;
@@ -25,6 +26,10 @@ pub(super) struct AssetBuffers {
     pub depth: Buffer,
     pub boundary: Buffer,
     pub recurrence: Buffer,
+    /// Layout and profiles of the harmonics' bands.
+    pub bands: Buffer,
+    /// Where each sample's codes are, and its scales.
+    pub packed: Buffer,
     pub grid: Buffer,
     /// Where values hold, and the largest slope.
     pub centroids: Buffer,
@@ -39,6 +44,7 @@ pub(super) struct AssetBuffers {
     pub triangle_count: u32,
     pub diagonal: f32,
     pub fresnel: bool,
+    pub boundary_order: usize,
     pub heterogeneous: bool,
     pub grey: bool,
 }
@@ -77,8 +83,8 @@ impl AssetBuffers {
         let limits = device.limits();
         let most = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
         let largest = [
-            4 * samples.depth.len(),
-            4 * samples.boundary.len(),
+            samples.depth.codes.len() + 8,
+            samples.boundary.codes.len() + 8,
             16 * NEIGHBOURS * kernels.len(),
             36 * asset.mesh_triangles.len(),
             12 * asset.mesh_positions.len(),
@@ -102,9 +108,11 @@ impl AssetBuffers {
             normals: filled_buffer(device, "normals", normals.as_flattened(), storage),
             samples: filled_buffer(device, "samples", &kernels, storage),
             weights: filled_buffer(device, "weights", &samples.weight, storage),
-            depth: filled_buffer(device, "depth", &samples.depth, storage),
-            boundary: filled_buffer(device, "boundary", &samples.boundary, storage),
+            depth: filled_buffer(device, "depth", &packed::words(&samples.depth), storage),
+            boundary: filled_buffer(device, "boundary", &packed::words(&samples.boundary), storage),
             recurrence: filled_buffer(device, "recurrence", &recurrence, BufferUsages::UNIFORM),
+            bands: filled_buffer(device, "bands", &packed::bands(&samples), BufferUsages::UNIFORM),
+            packed: filled_buffer(device, "packed", &packed::records(&samples), storage),
             grid: filled_buffer(device, "grid", grid, storage),
             centroids: filled_buffer(device, "centroids", &centroids, storage),
             spokes: filled_buffer(device, "spokes", &spokes, storage),
@@ -115,6 +123,7 @@ impl AssetBuffers {
             triangle_count: asset.mesh_triangles.len() as u32,
             diagonal: info.diagonal(),
             fresnel,
+            boundary_order: info.boundary_order as usize,
             heterogeneous: asset.density.is_some(),
             grey: medium.is_grey(),
             medium: filled_buffer(device, "medium", &[medium], BufferUsages::UNIFORM),
@@ -141,6 +150,8 @@ pub(super) struct FrameBuffers {
     pub exact: Buffer,
     common: BindGroup,
     changed: bool,
+    /// Share of the lights that baked means serve.
+    pub means: f32,
 }
 
 /// The layout of the group that all passes share: the ray's view and the medium.
@@ -173,6 +184,7 @@ impl FrameBuffers {
             lights: empty_buffer(device, "lights", 64, BufferUsages::STORAGE | BufferUsages::COPY_DST),
             exact: empty_buffer(device, "exact", 16, BufferUsages::STORAGE | BufferUsages::COPY_DST),
             changed: true,
+            means: 1.0,
         }
     }
 
@@ -219,6 +231,7 @@ impl FrameBuffers {
         frame: &Frame,
         exact: Option<&ExactDepths>,
     ) -> Result<()> {
+        self.means = frame.share_of_means(exact);
         let mut tables: Vec<&[[f32; 2]]> = Vec::new();
         let mut records = Vec::with_capacity(frame.lights.len());
         for (i, light) in frame.lights.iter().enumerate() {

@@ -5,6 +5,8 @@ use crate::frame::{Frame, FrameLight};
 use bytemuck::{Pod, Zeroable};
 use diaphane_formats::asset::Asset;
 use diaphane_formats::encoding::Encoding;
+use diaphane_formats::kernel;
+use diaphane_formats::slopes::CELL_RADIUS;
 use glam::{DVec3, Vec3};
 
 use super::tiles::Tile;
@@ -36,12 +38,13 @@ pub(super) struct ViewUniform {
     pub specular: f32,
     pub alpha: f32,
     pub rays: u32,
-    pub unused: [u32; 3],
+    pub means: f32,
+    pub unused: [u32; 2],
 }
 
 impl ViewUniform {
     /// A frame's rays at `offset` inside the pixels of `tile`, which then hold `rays` rays.
-    pub fn new(frame: &Frame, diagonal: f32, tile: Tile, offset: [f32; 2], rays: u32) -> Self {
+    pub fn new(frame: &Frame, diagonal: f32, tile: Tile, offset: [f32; 2], rays: u32, means: f32) -> Self {
         let surface = &frame.surface;
         Self {
             origin: frame.view.origin,
@@ -61,7 +64,8 @@ impl ViewUniform {
             specular: if surface.reflection { surface.specular as f32 } else { 0.0 },
             alpha: (surface.roughness as f32).max(crate::cpu::surface::LEAST_ROUGHNESS).powi(2),
             rays,
-            unused: [0; 3],
+            means,
+            unused: [0; 2],
         }
     }
 }
@@ -71,7 +75,7 @@ impl ViewUniform {
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub(super) struct MediumUniform {
     pub kappa: Vec3,
-    pub order: u32,
+    pub cell_variance: f32,
     pub extinction: Vec3,
     pub samples: u32,
     pub ratio: Vec3,
@@ -95,12 +99,14 @@ impl MediumUniform {
         let reference = info.reference_extinction;
         let (encoding, epsilon) = match info.encoding {
             Encoding::Transmittance => (0, 0.0),
-            Encoding::Reciprocal { epsilon } => (1, epsilon),
+            Encoding::Reciprocal { epsilon } | Encoding::Lobe { epsilon } => (1, epsilon),
+            Encoding::Depth => (2, 0.0),
         };
         let grid = asset.density.as_ref();
         Self {
             kappa: along.min(DVec3::splat(MOST_EXTINCTION)).as_vec3(),
-            order: info.order,
+            // A kernel with disk radius 1 has sharpness a: R²/5 in units of 1/a².
+            cell_variance: (CELL_RADIUS * kernel::sharpness(1.0, info.width_factor)).powi(2) / 5.0,
             extinction: extinction.as_vec3(),
             samples: asset.samples.len() as u32,
             ratio: if reference > 0.0 { (extinction / reference).as_vec3() } else { Vec3::ZERO },
@@ -211,14 +217,15 @@ mod tests {
             least_distance,
             specular,
             alpha,
-            rays
+            rays,
+            means
         );
         mirrors!(
             MediumUniform,
             "medium.wgsl",
             "Medium",
             kappa,
-            order,
+            cell_variance,
             extinction,
             samples,
             ratio,

@@ -4,39 +4,96 @@
 
 @group(1) @binding(0) var<storage, read> centroids: array<vec4f>;   // where values hold, largest slope
 @group(1) @binding(1) var<storage, read> weights: array<f32>;
-@group(1) @binding(2) var<storage, read> depth: array<f32>;         // order * order coefficients a sample
-@group(1) @binding(3) var<storage, read> boundary: array<f32>;      // as depth; only where ior is not 1
+@group(1) @binding(2) var<storage, read> depth: array<u32>;         // codes of the depth's harmonics
+@group(1) @binding(3) var<storage, read> boundary: array<u32>;      // the same of the boundary; only where ior is not 1
 @group(1) @binding(4) var<storage, read> lights: array<Light>;
 @group(1) @binding(5) var<storage, read> exact: array<vec2f>;       // [table][sample]: density length, boundary
 @group(1) @binding(6) var<storage, read_write> values: array<vec4f>; // v, weight
-@group(1) @binding(7) var<uniform> recurrence: array<vec4f, 100>;
+@group(1) @binding(7) var<uniform> recurrence: array<vec4f, 196>;
+@group(1) @binding(8) var<uniform> bands: array<Band, 14>;
+// First byte of the depth's codes; its order and scale (f16); the boundary's scale and the lobe (f16 x 4).
+@group(1) @binding(9) var<storage, read> packed: array<vec4u>;
 
 override FRESNEL: bool = false;
+override BOUNDARY_ORDER: u32 = 0u;
+override BOUNDARY_BYTES: u32 = 0u; // of each sample's codes
+
+// How the codes of one band of the harmonics are read; formats/src/harmonics.rs states the layout.
+struct Band {
+    before: u32,   // bits in front of it
+    bits: u32,     // of one code
+    depth: f32,    // profile of the depth's harmonics
+    boundary: f32, // of the boundary's
+}
+
+// Most coefficients of a sample.
+const MOST: u32 = 196u;
+
+// Coefficients of the sample at hand; those of bands that it lacks are neither written nor read.
+var<private> of_depth: array<f32, MOST>;
+var<private> of_boundary: array<f32, MOST>;
+
+// A coefficient from a code of `bits` bits, two's complement: twin of `harmonics::expanded`.
+fn expanded(word: u32, bits: u32, unit: f32) -> f32 {
+    let q = f32(bitcast<i32>(word << (32u - bits)) >> (32u - bits));
+    let u = abs(q) / f32((1u << (bits - 1u)) - 1u);
+    return sign(q) * unit * u * sqrt(u);
+}
+
+fn field(low: u32, high: u32, shift: u32) -> u32 {
+    return select(low >> shift, (low >> shift) | (high << (32u - shift)), shift > 0u);
+}
+
+fn decode_depth(start: u32, order: u32, scale: f32) {
+    for (var l = 0u; l < order; l++) {
+        let band = bands[l];
+        for (var k = 0u; k < 2u * l + 1u; k++) {
+            let at = 8u * (start & 3u) + band.before + k * band.bits;
+            let word = (start >> 2u) + (at >> 5u);
+            of_depth[l * l + k] =
+                expanded(field(depth[word], depth[word + 1u], at & 31u), band.bits, scale * band.depth);
+        }
+    }
+}
+
+fn decode_boundary(start: u32, scale: f32) {
+    for (var l = 0u; l < BOUNDARY_ORDER; l++) {
+        let band = bands[l];
+        for (var k = 0u; k < 2u * l + 1u; k++) {
+            let at = 8u * (start & 3u) + band.before + k * band.bits;
+            let word = (start >> 2u) + (at >> 5u);
+            of_boundary[l * l + k] =
+                expanded(field(boundary[word], boundary[word + 1u], at & 31u), band.bits, scale * band.boundary);
+        }
+    }
+}
 
 // Stored functions of optical depth and of the boundary in one direction.
-fn stored(sample: u32, d: vec3f) -> vec2f {
-    let base = sample * medium.order * medium.order;
+fn stored(order: vec2u, d: vec3f) -> vec2f {
     var sum = vec2f(0.0);
     var cos_m = 1.0;
     var sin_m = 0.0;
-    for (var m = 0u; m < medium.order; m++) {
+    let most = max(order.x, order.y);
+    for (var m = 0u; m < most; m++) {
         let scale = select(1.4142135, 1.0, m == 0u);
         var walk = sh_start(m, cos_m, sin_m);
-        for (var l = m; l < medium.order; l++) {
+        for (var l = m; l < most; l++) {
             if (l > m) {
                 walk = sh_next(walk, l, m, d.z);
             }
-            let centre = base + l * (l + 1u);
+            let centre = l * (l + 1u);
             let even = scale * walk.current * cos_m;
-            sum.x += depth[centre + m] * even;
-            if (FRESNEL) {
-                sum.y += boundary[centre + m] * even;
+            let odd = scale * walk.current * sin_m;
+            if (l < order.x) {
+                sum.x += of_depth[centre + m] * even;
+                if (m > 0u) {
+                    sum.x += of_depth[centre - m] * odd;
+                }
             }
-            if (m > 0u) {
-                let odd = scale * walk.current * sin_m;
-                sum.x += depth[centre - m] * odd;
-                if (FRESNEL) {
-                    sum.y += boundary[centre - m] * odd;
+            if (FRESNEL && l < order.y) {
+                sum.y += of_boundary[centre + m] * even;
+                if (m > 0u) {
+                    sum.y += of_boundary[centre - m] * odd;
                 }
             }
         }
@@ -51,6 +108,9 @@ fn stored(sample: u32, d: vec3f) -> vec2f {
 fn transmittance(value: f32) -> vec3f {
     if (all(medium.ratio == vec3f(0.0))) {
         return vec3f(1.0);
+    }
+    if (medium.encoding == 2u) {
+        return exp(-medium.ratio * max(value, 0.0));
     }
     if (value <= 0.0) {
         return vec3f(0.0);
@@ -79,6 +139,14 @@ fn light_samples(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgrou
     if (distance > 0.0) {
         towards_camera = away / distance;
     }
+    let record = packed[sample];
+    let order = vec2u(record.y & 0xffffu, BOUNDARY_ORDER);
+    decode_depth(record.x, order.x, unpack2x16float(record.y).y);
+    let halves = unpack2x16float(record.z);
+    if (FRESNEL) {
+        decode_boundary(sample * BOUNDARY_BYTES, halves.x);
+    }
+    let lobe = vec3f(halves.y, unpack2x16float(record.w));
     var sum = vec3f(0.0);
     for (var l = 0u; l < view.light_count; l++) {
         let light = lights[l];
@@ -91,8 +159,8 @@ fn light_samples(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgrou
             let known = exact[light.table * medium.samples + sample];
             psi = exp(-medium.extinction * known.x) * known.y;
         } else {
-            let value = stored(sample, arriving.towards);
-            psi = transmittance(value.x);
+            let value = stored(order, arriving.towards);
+            psi = transmittance(value.x + max(dot(lobe, arriving.towards), 0.0));
             if (FRESNEL) {
                 psi *= clamp(value.y, 0.0, 1.0);
             }

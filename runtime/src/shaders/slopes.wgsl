@@ -21,7 +21,9 @@ fn find_slopes(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups
     }
     let own = values[sample];
     let centroid = centroids[sample];
-    let to_centre = samples[sample].xyz - centroid.xyz;
+    let kernel = samples[sample];
+    let to_centre = kernel.xyz - centroid.xyz;
+    let variance = medium.cell_variance / (kernel.w * kernel.w);
     var value = own.xyz;
     for (var c = 0u; c < 3u; c++) {
         var slope = vec3f(0.0);
@@ -39,7 +41,9 @@ fn find_slopes(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups
             if (size > centroid.w) {
                 slope *= centroid.w / size;
             }
-            value[c] *= exp(clamp(dot(slope, to_centre), -MOST_EXPONENT, MOST_EXPONENT));
+            let along = dot(slope, to_centre);
+            let spread = max(variance * dot(slope, slope) - along * along, 0.0);
+            value[c] *= exp(clamp(along - 0.5 * view.means * spread, -MOST_EXPONENT, MOST_EXPONENT));
         }
         sources[SOURCE * sample + 1u + c] = vec4f(slope, 0.0);
     }

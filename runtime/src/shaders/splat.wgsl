@@ -140,31 +140,41 @@ fn add(in: Splat) -> Sums {
     if (ends.x >= ends.y) {
         discard;
     }
-    var path = Path(ends.x - tc, ends.y - ends.x, ends.x - whole.x, 1.0, 1.0);
-    if (HETEROGENEOUS) {
-        // Attenuation in front from the profile; inside the support it is taken as linear.
-        let first = profile_at(index, ends.x - whole.x, whole.y - whole.x);
-        let last = profile_at(index, ends.y - whole.x, whole.y - whole.x);
-        let slope = (last - first) * (1.0 / path.length);
-        path.before = first.x;
-        path.density = slope.x;
-        path.scattering = slope.y;
-    }
     let long = a * (whole.y - whole.x) >= LEAST_WIDTHS;
-    let red = kernel_weight(a, d2, path, medium.kappa.x, long);
-    var w = vec3f(red.x);
-    var mean = vec3f(red.y);
-    if (!GREY) {
-        let green = kernel_weight(a, d2, path, medium.kappa.y, long);
-        let blue = kernel_weight(a, d2, path, medium.kappa.z, long);
-        w = vec3f(red.x, green.x, blue.x);
-        mean = vec3f(red.y, green.y, blue.y);
-    }
-    w *= in.source.w;
-    // The source's mean under the weight: it grows exponentially from the kernel's centre.
     let rise = -vec3f(dot(in.slope_r, across), dot(in.slope_g, across), dot(in.slope_b, across));
     let slope = vec3f(dot(in.slope_r, direction), dot(in.slope_g, direction), dot(in.slope_b, direction));
-    let exponent = rise + slope * (mean + 0.25 / (a * a) * slope);
-    let value = in.source.xyz * exp(clamp(exponent, vec3f(-MOST_EXPONENT), vec3f(MOST_EXPONENT)));
-    return Sums(vec4f(value * w, 1.0), vec4f(w, 0.0));
+    var numerator = vec3f(0.0);
+    var denominator = vec3f(0.0);
+    // Where the density changes within the support, each half has its own.
+    let parts = select(1u, 2u, HETEROGENEOUS);
+    let size = (ends.y - ends.x) / f32(parts);
+    for (var part = 0u; part < parts; part++) {
+        let near = ends.x + f32(part) * size;
+        var path = Path(near - tc, size, near - whole.x, 1.0, 1.0);
+        if (HETEROGENEOUS) {
+            // Attenuation in front from the profile; inside the part it is taken as linear.
+            let first = profile_at(index, near - whole.x, whole.y - whole.x);
+            let last = profile_at(index, near + size - whole.x, whole.y - whole.x);
+            let change = (last - first) * (1.0 / size);
+            path.before = first.x;
+            path.density = change.x;
+            path.scattering = change.y;
+        }
+        let red = kernel_weight(a, d2, path, medium.kappa.x, long);
+        var w = vec3f(red.x);
+        var mean = vec3f(red.y);
+        if (!GREY) {
+            let green = kernel_weight(a, d2, path, medium.kappa.y, long);
+            let blue = kernel_weight(a, d2, path, medium.kappa.z, long);
+            w = vec3f(red.x, green.x, blue.x);
+            mean = vec3f(red.y, green.y, blue.y);
+        }
+        w *= in.source.w;
+        // The source's mean under the weight: it grows exponentially from the kernel's centre.
+        let spread = min(0.25 / (a * a), size * size * (1.0 / 24.0));
+        let exponent = rise + slope * (mean + spread * slope);
+        numerator += in.source.xyz * exp(clamp(exponent, vec3f(-MOST_EXPONENT), vec3f(MOST_EXPONENT))) * w;
+        denominator += w;
+    }
+    return Sums(vec4f(numerator, 1.0), vec4f(denominator, 0.0));
 }

@@ -4,6 +4,7 @@ use diaphane_formats::asset::{Asset, DensityGrid, Info, Provenance, Samples};
 use diaphane_formats::directions::{even_directions, hash};
 use diaphane_formats::encoding::Encoding;
 use diaphane_formats::fresnel;
+use diaphane_formats::harmonics::Coefficients;
 use diaphane_formats::mesh::MeshReport;
 use diaphane_formats::phase::Phase;
 use diaphane_formats::sh;
@@ -109,17 +110,32 @@ impl Object {
         };
         let reference = self.extinction.iter().sum::<f64>() / 3.0;
         let mut samples = Samples::default();
-        for p in &points {
+        // Fewer bands for every third sample, as a bake has them.
+        let orders =
+            (0..points.len()).map(|i| (self.order - u32::from(i % 3 == 0 && self.order > 2)) as u8).collect();
+        let mut depth = Coefficients::zeros(orders);
+        let boundary = if self.ior == 1.0 { 0 } else { self.order };
+        let mut through =
+            Coefficients::zeros(vec![boundary as u8; if boundary > 0 { points.len() } else { 0 }]);
+        for (i, p) in points.iter().enumerate() {
             let x = p.as_dvec3();
             samples.offset.push([0; 4]);
             samples.position_radius.push([p.x, p.y, p.z, 0.55 * self.spacing]);
             samples.weight.push(0.5 + hash(3, u64::from(p.x.to_bits())) as f32 / 2f32.powi(64));
-            samples.depth.extend(project(&|d| self.encoding.encode(reference * chord(x, d))));
+            let stored = project(&|d| self.encoding.encode(reference * chord(x, d)));
+            let own = depth.of_mut(i);
+            own.copy_from_slice(&stored[..own.len()]);
+            if self.encoding.has_lobe() {
+                samples.lobe.push((x.normalize().as_vec3() * 0.3).to_array().map(f16::from_f32));
+            }
             if self.ior != 1.0 {
                 let exit = |d: DVec3| (x + d * chord(x, d)).normalize().dot(d);
-                samples.boundary.extend(project(&|d| fresnel::transmittance(exit(d), self.ior)));
+                let stored = project(&|d| fresnel::transmittance(exit(d), self.ior));
+                through.of_mut(i).copy_from_slice(&stored);
             }
         }
+        samples.depth = depth.quantised();
+        samples.boundary = through.quantised();
         let low = self.positions.iter().fold(Vec3::INFINITY, |a, p| a.min(*p));
         let high = self.positions.iter().fold(Vec3::NEG_INFINITY, |a, p| a.max(*p));
         let asset = Asset {
@@ -143,6 +159,8 @@ impl Object {
                 samples: points.len() as u64,
                 discarded: 0,
                 order: self.order,
+                light_error: 0.0,
+                boundary_order: boundary,
                 encoding: self.encoding,
                 reference_extinction: reference,
                 width_factor: 1.5,

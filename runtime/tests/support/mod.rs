@@ -5,6 +5,7 @@
 use diaphane_formats::asset::{Asset, Info, Provenance, Samples};
 use diaphane_formats::directions::{even_directions, hash};
 use diaphane_formats::encoding::Encoding;
+use diaphane_formats::harmonics::Coefficients;
 use diaphane_formats::mesh::{Mesh, MeshReport};
 use diaphane_formats::phase::Phase;
 use diaphane_formats::scene::{Camera, ImageSize, Light, Scene, Surface};
@@ -90,7 +91,8 @@ pub fn ball(spacing: f64, centre: DVec3, phase: Phase) -> Asset {
         .collect();
     let solid_angle = 4.0 * std::f64::consts::PI / directions.len() as f64;
     let mut samples = Samples::default();
-    for p in &places {
+    let mut depth = Coefficients::zeros(vec![ORDER as u8; places.len()]);
+    for (i, p) in places.iter().enumerate() {
         let mut coefficients = [0.0; ORDER * ORDER];
         for (w, y) in directions.iter().zip(&basis) {
             let value = encoding.encode(EXTINCTION * chord(*p, *w)) * solid_angle;
@@ -100,8 +102,9 @@ pub fn ball(spacing: f64, centre: DVec3, phase: Phase) -> Asset {
         samples.offset.push([0; 4]);
         samples.position_radius.push([q.x, q.y, q.z, spacing as f32]);
         samples.weight.push(1.0);
-        samples.depth.extend(coefficients.map(|c| c as f32));
+        depth.of_mut(i).copy_from_slice(&coefficients.map(|c| c as f32));
     }
+    samples.depth = depth.quantised();
     let mesh = sphere_mesh(4);
     let (low, high) = mesh.bounds();
     Asset {
@@ -125,6 +128,8 @@ pub fn ball(spacing: f64, centre: DVec3, phase: Phase) -> Asset {
             samples: samples.len() as u64,
             discarded: 0,
             order: ORDER as u32,
+            light_error: 0.0,
+            boundary_order: 0,
             encoding,
             reference_extinction: EXTINCTION,
             width_factor: 1.4,

@@ -5,6 +5,7 @@ use super::super::scene::{AssetBuffers, FrameBuffers};
 use super::super::shaders;
 use super::super::timers::Pass;
 use super::Recorder;
+use diaphane_formats::harmonics;
 use wgpu::{BindGroup, BindGroupLayout, ComputePipeline, Device, ShaderStages};
 
 /// See lighting.wgsl.
@@ -16,11 +17,15 @@ pub(crate) struct Lighting {
 impl Lighting {
     pub fn new(device: &Device, common: &BindGroupLayout, asset: &AssetBuffers) -> Self {
         use Slot::{Read, Uniform, Write};
-        let slots = [Read, Read, Read, Read, Read, Read, Write, Uniform];
+        let slots = [Read, Read, Read, Read, Read, Read, Write, Uniform, Uniform, Read];
         let layout = layout(device, "lighting", ShaderStages::COMPUTE, &slots);
         let pipeline_layout = pipeline_layout(device, "lighting", common, &layout);
         let module = shaders::module(device, "lighting", shaders::LIGHTING);
-        let constants = [("FRESNEL", f64::from(u8::from(asset.fresnel)))];
+        let constants = [
+            ("FRESNEL", f64::from(u8::from(asset.fresnel))),
+            ("BOUNDARY_ORDER", asset.boundary_order as f64),
+            ("BOUNDARY_BYTES", harmonics::bytes(asset.boundary_order) as f64),
+        ];
         let pipeline = compute(device, "lighting", &pipeline_layout, &module, &constants);
         Self { layout, pipeline }
     }
@@ -35,6 +40,8 @@ impl Lighting {
             &frame.exact,
             &asset.values,
             &asset.recurrence,
+            &asset.bands,
+            &asset.packed,
         ];
         group(device, "lighting", &self.layout, resources.map(|b| b.as_entire_binding()).into())
     }

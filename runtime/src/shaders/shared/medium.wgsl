@@ -1,11 +1,11 @@
 // The asset's medium: mirrors `MediumUniform` in gpu/uniforms.rs.
 struct Medium {
     kappa: vec3f,           // extinction along a ray, per unit of profile density, or absolute without a profile
-    order: u32,             // bands of the spherical harmonics
+    cell_variance: f32,     // of the cell that a sample's values are the mean of, in units of 1 / sharpness^2
     extinction: vec3f,      // per unit of density length
     samples: u32,
     ratio: vec3f,           // extinction over the reference extinction
-    encoding: u32,          // 0: transmittance, 1: reciprocal
+    encoding: u32,          // 0: transmittance, 1: reciprocal, 2: depth
     albedo: vec3f,
     epsilon: f32,           // of the reciprocal encoding
     grid_min: vec3f,

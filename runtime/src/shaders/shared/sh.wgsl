@@ -1,6 +1,6 @@
 // Real spherical harmonics by recurrence, as in formats/src/sh.rs. The including shader declares
-// `recurrence`: for each l * 10 + m the constants (a, b), or the diagonal where l = m.
-const SH_MAX_ORDER: u32 = 10u;
+// `recurrence`: for each l * 14 + m the constants (a, b), or the diagonal where l = m.
+const SH_MAX_ORDER: u32 = 14u;
 
 // Sine and cosine parts of one basis pair: x belongs to +m, y to -m (0 for m = 0).
 struct ShWalk {

@@ -17,6 +17,7 @@ struct View {
     specular: f32,          // 0: no highlights
     alpha: f32,             // squared roughness
     rays: u32,              // rays of each pixel drawn so far, this one included
+    means: f32,             // share of the lights whose values are means over a sample's cell
 }
 
 @group(0) @binding(0) var<uniform> view: View;
