@@ -91,7 +91,7 @@ struct BakeArguments {
 enum PresetName {
     /// 5,000 samples, 96 directions, at most 6 bands.
     Draft,
-    /// 50,000 samples, 256 directions, at most 10 bands.
+    /// 50,000 samples, 512 directions, at most 10 bands.
     Standard,
     /// 50,000 samples, 512 directions, at most 14 bands.
     Fine,

@@ -57,7 +57,7 @@ impl Params {
     pub fn preset(preset: Preset) -> Self {
         let (samples, directions, points_per_sample, order, light_error) = match preset {
             Preset::Draft => (5_000, 96, 4, 6, 0.03),
-            Preset::Standard => (50_000, 256, 8, 10, 0.01),
+            Preset::Standard => (50_000, 512, 6, 10, 0.01),
             Preset::Fine => (50_000, 512, 16, 14, 0.003),
         };
         Self {

@@ -2,9 +2,9 @@
 //! as it needs.
 //!
 //! The stored function y(ω) = Σ c_k Y_k(ω) is decoded to ψ̂ = exp(-τ(y)) at run time, so the coefficients minimise
-//! Σ_ω (ψ̂ - ψ)² (see [`super::least_squares`]). The plain projection minimises the error of y instead, which matters
+//! Σ_ω (ψ̂ - ψ)² (see [`super::least_squares`]); a plain projection minimises the error of y instead, which matters
 //! most where no light comes from. Orders are tried upwards in steps of two until the error of ψ meets the target; each
-//! starts from the coefficients of the one before. What is kept is quantised ([`diaphane_formats::harmonics`]).
+//! starts from the coefficients of the one before or from a linear fit, whichever is nearer. What is kept is quantised ([`diaphane_formats::harmonics`]).
 
 use super::depths::Lit;
 use super::least_squares::{BATCH, Batch};
@@ -35,11 +35,17 @@ const BOUNDARY_ORDER: usize = 6;
 /// Samples of one task.
 const TASK: usize = 4 * BATCH;
 
+/// Samples whose error exceeds the target by this factor go to the highest order at once.
+const HOPELESS: f64 = 4.0;
+
 /// One fitted sample.
+#[derive(Default)]
 struct Fitted {
     order: usize,
     coefficients: Vec<f32>,
     lobe: Vec3,
+    /// Root mean square over directions.
+    error: f32,
 }
 
 /// Bands of the boundary's transmittance at most `order`; 0 when index matched.
@@ -94,23 +100,31 @@ fn ladder(highest: usize) -> Vec<usize> {
 /// Fits the samples of one task; `psi` holds their transmittances, row-major [sample][direction].
 fn fit(psi: &[f32], lit: &Lit, basis: &Array2<f32>, params: &Params) -> Vec<Fitted> {
     let columns = lit.directions.len();
-    let count = psi.len() / columns;
-    let mut out: Vec<Fitted> =
-        (0..count).map(|_| Fitted { order: 0, coefficients: Vec::new(), lobe: Vec3::ZERO }).collect();
-    let mut open: Vec<usize> = (0..count).collect();
+    let mut out: Vec<Fitted> = (0..psi.len() / columns).map(|_| Fitted::default()).collect();
+    let mut open: Vec<usize> = (0..out.len()).collect();
+    let mut hopeless: Vec<usize> = Vec::new();
     let orders = ladder(params.order);
     for (k, order) in orders.iter().enumerate() {
         let last = k + 1 == orders.len();
+        if last {
+            open.append(&mut hopeless);
+        }
         let mut still = Vec::new();
         for group in open.chunks(BATCH) {
             let rows = Array2::from_shape_fn((group.len(), columns), |(q, d)| psi[group[q] * columns + d]);
+            let basis = basis.slice_axis(Axis(1), Slice::from(..coefficient_count(*order)));
+            let batch = Batch { basis, lobe: None };
+            let before: Vec<&Fitted> = group.iter().map(|i| &out[*i]).collect();
             let steps = STEPS[usize::from(last)];
-            let fitted = fit_batch(&rows, group, &out, lit, basis, params.encoding, *order, steps);
-            for (q, (fitted, error)) in fitted.into_iter().enumerate() {
-                out[group[q]] = fitted;
-                if f64::from(error) > params.light_error {
-                    still.push(group[q]);
+            let fitted = fit_batch(&rows, &before, batch, &lit.directions, params.encoding, steps);
+            for (i, fitted) in group.iter().zip(fitted) {
+                let error = f64::from(fitted.error);
+                if error > HOPELESS * params.light_error && !last {
+                    hopeless.push(*i);
+                } else if error > params.light_error {
+                    still.push(*i);
                 }
+                out[*i] = fitted;
             }
         }
         open = still;
@@ -118,55 +132,56 @@ fn fit(psi: &[f32], lit: &Lit, basis: &Array2<f32>, params: &Params) -> Vec<Fitt
     out
 }
 
-/// Fits one batch at one order, from the coefficients of a lower one where there are any.
-#[expect(clippy::too_many_arguments, reason = "one call site, all of them different things")]
+/// Fits one batch at the order of `batch`, from the coefficients of a lower one where there are any. A lobe that would
+/// take light away is left out.
 fn fit_batch(
     psi: &Array2<f32>,
-    group: &[usize],
-    before: &[Fitted],
-    lit: &Lit,
-    basis: &Array2<f32>,
+    before: &[&Fitted],
+    batch: Batch<'_>,
+    directions: &[DVec3],
     encoding: Encoding,
-    order: usize,
     steps: usize,
-) -> Vec<(Fitted, f32)> {
-    let n = coefficient_count(order);
-    let run = |lobe: Option<&Array2<f32>>| {
-        let batch = Batch { basis: basis.slice_axis(Axis(1), Slice::from(..n)), lobe };
-        let warm = lobe.is_none() && before[group[0]].order > 0;
-        let mut x = if warm {
-            Array2::from_shape_fn((group.len(), n), |(q, k)| {
-                before[group[q]].coefficients.get(k).copied().unwrap_or(0.0)
-            })
-        } else {
-            batch.start(encoding, psi)
-        };
-        // The transmittance itself is projected, as the thesis does.
-        let steps = if encoding == Encoding::Transmittance { 0 } else { steps };
+) -> Vec<Fitted> {
+    let n = batch.unknowns();
+    let order = n.isqrt();
+    let axes: Vec<Vec3> = if encoding.has_lobe() {
+        (0..before.len()).map(|q| brightest(psi.row(q).iter(), directions)).collect()
+    } else {
+        Vec::new()
+    };
+    let lobe = Array2::from_shape_fn(if axes.is_empty() { (0, 0) } else { psi.dim() }, |(q, d)| {
+        axes[q].dot(directions[d].as_vec3()).max(0.0)
+    });
+    let run = |batch: &Batch<'_>| {
+        let mut x = batch.start(encoding, psi);
+        if before.iter().any(|b| !b.coefficients.is_empty()) {
+            let warm = Array2::from_shape_fn(x.dim(), |(q, k)| match k {
+                k if k == n => before[q].lobe.length(),
+                k => before[q].coefficients.get(k).copied().unwrap_or(0.0),
+            });
+            batch.take_better(encoding, psi, &warm, &mut x);
+        }
         let errors = batch.improve(encoding, psi, steps, &mut x);
         (x, errors)
     };
-    let (x, errors) = run(None);
-    let mut fitted: Vec<(Fitted, f32)> = (0..group.len())
-        .map(|q| {
-            let coefficients = x.row(q).iter().copied().collect();
-            (Fitted { order, coefficients, lobe: Vec3::ZERO }, errors[q])
-        })
-        .collect();
-    if encoding.has_lobe() {
-        let axes: Vec<Vec3> =
-            (0..group.len()).map(|q| brightest(psi.row(q).iter(), &lit.directions)).collect();
-        let lobe =
-            Array2::from_shape_fn(psi.dim(), |(q, d)| axes[q].dot(lit.directions[d].as_vec3()).max(0.0));
-        let (x, errors) = run(Some(&lobe));
-        for (q, slot) in fitted.iter_mut().enumerate() {
-            if x[[q, n]] > 0.0 && errors[q] < slot.1 {
-                let coefficients = x.row(q).iter().take(n).copied().collect();
-                *slot = (Fitted { order, coefficients, lobe: axes[q] * x[[q, n]] }, errors[q]);
-            }
-        }
+    let taken = |x: &Array2<f32>, errors: &[f32], q: usize, lobe: Vec3| Fitted {
+        order,
+        coefficients: x.row(q).iter().take(n).copied().collect(),
+        lobe,
+        error: errors[q],
+    };
+    if axes.is_empty() {
+        let (x, errors) = run(&batch);
+        return (0..before.len()).map(|q| taken(&x, &errors, q, Vec3::ZERO)).collect();
     }
-    fitted
+    let (with, errors) = run(&Batch { basis: batch.basis, lobe: Some(&lobe) });
+    let plain = with.column(n).iter().any(|a| *a <= 0.0).then(|| run(&batch));
+    (0..before.len())
+        .map(|q| match &plain {
+            Some((x, errors)) if with[[q, n]] <= 0.0 => taken(x, errors, q, Vec3::ZERO),
+            _ => taken(&with, &errors, q, axes[q] * with[[q, n]]),
+        })
+        .collect()
 }
 
 /// The direction of the first moment of ψ: towards the nearest surface, where that is near.

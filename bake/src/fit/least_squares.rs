@@ -100,6 +100,27 @@ impl Batch<'_> {
         self.linear(&weight, &right, &vec![DAMPING; psi.nrows()])
     }
 
+    /// Takes the rows of `other` that come closer to ψ than those of `x`.
+    pub fn take_better(
+        &self,
+        encoding: Encoding,
+        psi: &Array2<f32>,
+        other: &Array2<f32>,
+        x: &mut Array2<f32>,
+    ) {
+        let errors = |x: &Array2<f32>| {
+            let mut y = Array2::<f32>::zeros(psi.dim());
+            self.forward(x, &mut y);
+            errors(encoding, psi, &y)
+        };
+        let (own, theirs) = (errors(x), errors(other));
+        for (q, (own, theirs)) in own.into_iter().zip(theirs).enumerate() {
+            if theirs < own {
+                x.row_mut(q).assign(&other.row(q));
+            }
+        }
+    }
+
     /// Improves `x` in at most `steps` steps; returns each row's root mean square error of ψ.
     pub fn improve(
         &self,
@@ -113,9 +134,7 @@ impl Batch<'_> {
         let mut moved = y.clone();
         let (mut weight, mut right) = (y.clone(), y.clone());
         self.forward(x, &mut y);
-        let mut least: Vec<f32> = (0..rows)
-            .map(|q| error(encoding, psi.row(q).iter().zip(y.row(q)).map(|(psi, y)| (*psi, *y))))
-            .collect();
+        let mut least = errors(encoding, psi, &y);
         let mut damping = vec![DAMPING; rows];
         let mut done = vec![false; rows];
         for _ in 0..steps {
@@ -160,6 +179,12 @@ impl Batch<'_> {
         }
         least.iter().map(|e| (e / columns as f32).sqrt()).collect()
     }
+}
+
+/// Squared error of every row.
+fn errors(encoding: Encoding, psi: &Array2<f32>, y: &Array2<f32>) -> Vec<f32> {
+    let pairs = |q: usize| psi.row(q).into_iter().copied().zip(y.row(q).into_iter().copied());
+    (0..psi.nrows()).map(|q| error(encoding, pairs(q))).collect()
 }
 
 fn error(encoding: Encoding, pairs: impl Iterator<Item = (f32, f32)>) -> f32 {
