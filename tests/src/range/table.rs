@@ -41,7 +41,7 @@ impl Line {
 pub fn text(lines: &[Line]) -> String {
     let width = lines.iter().map(|l| l.name.len()).max().unwrap_or(0).max(4);
     let mut out = format!(
-        "{:<width$}   {:>8} {:>7} {:>8} {:>8} {:>10} {:>10} {:>8} {:>7}",
+        "{:<width$}    {:>8} {:>7} {:>8} {:>8} {:>10} {:>10} {:>8} {:>7}",
         "row", "rel_rmse", "psnr_db", "bias", "p99_rel", "non_finite", "splats/ray", "noise", "bake_s"
     );
     for l in lines {
@@ -92,4 +92,45 @@ pub fn csv(lines: &[Line]) -> String {
         );
     }
     out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn line(name: &str, judged: bool, rel_rmse: f64, non_finite: usize) -> Line {
+        let metrics = Metrics { rel_rmse, psnr_db: 30.0, bias: 0.01, p99_rel: 0.1, non_finite, pixels: 10 };
+        Line {
+            name: name.to_owned(),
+            judged,
+            metrics,
+            splats_per_ray: 50.0,
+            reference_noise: 0.01,
+            bake_seconds: 1.0,
+            samples: 100,
+            asset_bytes: 1000,
+        }
+    }
+
+    #[test]
+    fn only_judged_errors_and_values_that_are_not_finite_fail() {
+        assert!(line("a", true, 0.1, 0).passes(Some(0.1)));
+        assert!(!line("a", true, 0.1, 0).passes(Some(0.09)));
+        assert!(line("a", false, 0.1, 0).passes(Some(0.09)));
+        assert!(!line("a", true, f64::NAN, 0).passes(Some(1.0)));
+        assert!(line("a", true, 5.0, 0).passes(None));
+        assert!(!line("a", false, 0.1, 1).passes(None));
+    }
+
+    #[test]
+    fn columns_stand_under_their_names() {
+        let lines = [line("a-long-name", false, 0.04, 0), line("b", true, 80.5, 0)];
+        let text = text(&lines);
+        let ends: Vec<usize> = text.lines().map(|l| l.len()).collect();
+        assert_eq!(ends, [ends[0]; 3]);
+        let at = text.find("rel_rmse").unwrap() + "rel_rmse".len();
+        let rows: Vec<&str> = text.lines().skip(1).collect();
+        assert!(rows[0][..at].ends_with(" *~   0.0400") && rows[1][..at].ends_with("    80.5000"), "{text}");
+        assert_eq!(csv(&lines).lines().count(), 3);
+    }
 }
