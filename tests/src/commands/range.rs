@@ -1,12 +1,13 @@
 //! `diaphane-validate range`: the whole range of media, lights and views in one table.
 
+use super::image::LightName;
 use super::output::{say, tell, warn};
 use super::progress::RowDisplay;
 use super::{check_folder, make_folder};
 use clap::ValueEnum;
 use diaphane_bake::params::{Params, Preset};
 use diaphane_formats::files::write_atomically;
-use diaphane_runtime::player::{Backend, LightMode};
+use diaphane_runtime::player::Backend;
 use std::path::PathBuf;
 use std::time::Instant;
 use validation::metrics::compare;
@@ -22,13 +23,11 @@ use validation::report::{Case, write_pictures, write_report};
 
 /// Which rows, and how.
 #[derive(clap::Args)]
-#[command(
-    after_help = "Every distinct object and medium is baked once and played with baked light on the CPU. References \
+#[command(after_help = "Every distinct object and medium is baked once and played on the CPU. References \
                         are kept in DIR/references and used again while nothing that they depend on changes. Writes \
                         range.csv, report.html and report.json, and each row's pictures to DIR/pictures/ROW.\n\n\
                         Examples:\n  diaphane-validate range --output-dir range\n  diaphane-validate range --filter \
-                        torus --samples 10000 --max-error 0.1"
-)]
+                        torus --samples 10000 --max-error 0.1")]
 pub struct Arguments {
     /// Folder for everything, made if missing
     #[arg(long, value_name = "DIR", default_value = "out/range")]
@@ -51,6 +50,9 @@ pub struct Arguments {
     /// Relative noise of the references at which to stop
     #[arg(long, default_value_t = 0.003)]
     tolerance: f64,
+    /// Where the depth towards lights comes from; exact leaves out the error of the baked light
+    #[arg(long, value_enum, default_value_t = LightName::Baked)]
+    light: LightName,
     /// Seed of the references' noise
     #[arg(long, default_value_t = 0)]
     seed: u64,
@@ -152,7 +154,7 @@ fn measure(
     display.work(&row.name);
     let scene = row.scene(placed, a.image);
     dye(&mut baked.asset, &row.material);
-    let mut played = play(&baked.asset, &scene, Backend::Cpu, LightMode::Baked, 1)?;
+    let mut played = play(&baked.asset, &scene, Backend::Cpu, a.light.into(), 1)?;
     played.warnings.extend(baked.shortfalls.iter().cloned());
     let settings = Settings { tolerance: a.tolerance, seed: a.seed, ..Settings::default() };
     let medium = row.material.medium(placed)?;
