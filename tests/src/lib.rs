@@ -7,5 +7,6 @@
 
 pub mod metrics;
 pub mod play;
+pub mod range;
 pub mod reference;
 pub mod report;

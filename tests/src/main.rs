@@ -29,6 +29,8 @@ enum Command {
     Image(commands::image::Arguments),
     /// Bake, play and check the built-in objects
     Demo(commands::demo::Arguments),
+    /// Bake, play and check a table of media, lights and views
+    Range(commands::range::Arguments),
 }
 
 fn main() -> ExitCode {
@@ -49,6 +51,7 @@ fn main() -> ExitCode {
         Command::Compare(a) => commands::compare::run(&a),
         Command::Image(a) => commands::image::run(&a),
         Command::Demo(a) => commands::demo::run(&a),
+        Command::Range(a) => commands::range::run(&a),
     };
     match result {
         Ok(true) => ExitCode::SUCCESS,

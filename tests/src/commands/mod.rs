@@ -5,6 +5,7 @@ pub mod demo;
 pub mod image;
 pub mod output;
 pub mod progress;
+pub mod range;
 pub mod reference;
 
 use anyhow::Context;

@@ -81,3 +81,86 @@ impl diaphane_bake::progress::Progress for Display {
         false
     }
 }
+
+/// Shows how far a table of rows is.
+pub struct RowDisplay {
+    bar: Option<ProgressBar>,
+    total: usize,
+    /// Name of the row at work, and number of rows done.
+    state: std::sync::Mutex<(String, usize)>,
+}
+
+impl RowDisplay {
+    /// A display of `total` rows, none done.
+    pub fn new(total: usize) -> Self {
+        let bar = std::io::stderr().is_terminal().then(|| {
+            let bar = ProgressBar::new(total as u64);
+            let style = ProgressStyle::with_template("{pos:>3}/{len} {bar:24} {elapsed:>4}  {prefix}  {msg}");
+            bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+            bar
+        });
+        Self { bar, total, state: std::sync::Mutex::default() }
+    }
+
+    fn state(&self) -> std::sync::MutexGuard<'_, (String, usize)> {
+        self.state.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
+    }
+
+    fn message(&self, text: String) {
+        if let Some(bar) = &self.bar {
+            bar.set_message(text);
+        }
+    }
+
+    /// Work on a row begins.
+    pub fn work(&self, name: &str) {
+        name.clone_into(&mut self.state().0);
+        if let Some(bar) = &self.bar {
+            bar.set_prefix(name.to_owned());
+        }
+    }
+
+    /// The row at work is done.
+    pub fn done(&self, result: &str) {
+        let mut state = self.state();
+        state.1 += 1;
+        match &self.bar {
+            Some(bar) => bar.set_position(state.1 as u64),
+            None => tell(&format!("{}/{} {}: {result}", state.1, self.total, state.0)),
+        }
+    }
+
+    /// Progress of the row's reference.
+    pub fn reference(&self, p: Progress) {
+        let noise =
+            if p.error.is_finite() { format!(", noise {:.2} %", 100.0 * p.error) } else { String::new() };
+        self.message(format!("reference: pass {}{noise}", p.pass));
+    }
+
+    /// Prints lines without the bar in between.
+    pub fn aside(&self, print: impl FnOnce()) {
+        match &self.bar {
+            Some(bar) => bar.suspend(print),
+            None => print(),
+        }
+    }
+
+    /// Takes the bar away.
+    pub fn finish(&self) {
+        if let Some(bar) = &self.bar {
+            bar.finish_and_clear();
+        }
+    }
+}
+
+impl diaphane_bake::progress::Progress for RowDisplay {
+    fn stage(&self, name: &'static str, _: u64) {
+        self.message(format!("bake: {name}"));
+    }
+
+    fn advance(&self, _: u64) {}
+
+    fn cancelled(&self) -> bool {
+        false
+    }
+}

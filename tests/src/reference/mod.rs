@@ -35,6 +35,9 @@ use rayon::prelude::*;
 use sequence::Sequence;
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 
+/// Raise it when the same input gives another picture: stored references of another version are not used.
+pub const VERSION: u32 = 1;
+
 /// Independent estimates of every pixel.
 pub const REPLICATES: usize = 8;
 
