@@ -3,12 +3,14 @@
 //! All positions are relative to [`Info::centre`] (the mesh's bounding box centre, kept in f64), so that f32 suffices
 //! wherever the object stands.
 
+mod certificate;
 mod codec;
 mod container;
 mod info;
 mod read;
 mod write;
 
+pub use certificate::{Certificate, CertifiedError};
 pub use info::{Info, Provenance};
 pub use read::{parse, read, section_sizes};
 pub use write::{encode, write};
