@@ -72,7 +72,7 @@ proptest! {
     #[test]
     fn any_bytes_are_survived(bytes in proptest::collection::vec(any::<u8>(), 0..400)) {
         prop_assert!(parse(&bytes).is_err());
-        let mut headed = b"DIAPHANE\x01\x00\x00\x00".to_vec();
+        let mut headed = b"DIAPHANE\x02\x00\x00\x00".to_vec();
         headed.extend(&bytes);
         prop_assert!(parse(&headed).is_err());
     }

@@ -23,7 +23,7 @@ use glam::{DVec3, Vec3};
 use half::f16;
 
 /// Version of the file format that this build writes and reads.
-pub const FORMAT_VERSION: u32 = 1;
+pub const FORMAT_VERSION: u32 = 2;
 
 /// A baked object.
 #[derive(Clone, Debug, PartialEq)]
