@@ -4,8 +4,8 @@
 mod workbench;
 
 use diaphane_formats::asset;
-use diaphane_formats::material::parse as parse_material;
-use diaphane_formats::scene::parse as parse_scene;
+use diaphane_formats::material::parse_material;
+use diaphane_formats::scene::parse_scene;
 use diaphane_runtime::player::{Backend, LightMode};
 use std::path::Path;
 use validation::metrics::compare;
