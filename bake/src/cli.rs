@@ -20,6 +20,7 @@ use std::path::{Path, PathBuf};
         diaphane-bake bunny.obj --material wax.material.toml --output bunny.dph\n  \
         diaphane-bake bunny.obj --material wax.material.toml --output bunny.dph --preset draft\n  \
         diaphane-bake bunny.obj --material wax.material.toml --output bunny.dph --samples 100000 --report bake.json\n  \
+        diaphane-bake bunny.obj --material wax.material.toml --output bunny.dph --max-error 0.03\n  \
         diaphane-bake inspect bunny.dph --json"
 )]
 pub struct Arguments {
@@ -31,7 +32,7 @@ pub struct Arguments {
 
 #[derive(Subcommand)]
 enum Command {
-    /// Shows what is in an asset, and its sizes.
+    /// Shows what is in an asset, its sizes and its error certificate.
     Inspect {
         /// The asset.
         asset: PathBuf,
@@ -79,6 +80,12 @@ struct BakeArguments {
     /// Threads to use; all cores if not given. The asset does not depend on it.
     #[arg(long, value_name = "T")]
     threads: Option<usize>,
+    /// Largest relative error of the certificate (0.03 is 3 %): adds samples or bands until it is met, or fails.
+    #[arg(long, value_name = "E", conflicts_with = "no_certificate")]
+    max_error: Option<f64>,
+    /// Does not measure the asset's error.
+    #[arg(long)]
+    no_certificate: bool,
     /// Writes a report in JSON.
     #[arg(long, value_name = "R.json")]
     report: Option<PathBuf>,
@@ -122,6 +129,8 @@ impl BakeArguments {
         params.order = self.sh_order.unwrap_or(params.order);
         params.light_error = self.light_error.unwrap_or(params.light_error);
         params.seed = self.seed.unwrap_or(params.seed);
+        params.certificate = !self.no_certificate;
+        params.max_error = self.max_error;
         params.encoding = match self.encoding {
             EncodingName::Reciprocal => Encoding::RECIPROCAL,
             EncodingName::Lobe => Encoding::LOBE,
@@ -203,6 +212,7 @@ fn run_bake(arguments: &BakeArguments) -> anyhow::Result<()> {
             report.bytes as f64 / 1e6,
             report.seconds.get("total").copied().unwrap_or_default()
         );
+        println!("error: {}", inspect::certified(report.certificate.as_ref()));
     }
     Ok(())
 }

@@ -16,6 +16,9 @@ pub enum Error {
     /// No sample found a place.
     #[error("no sample found a place inside the mesh: {0}")]
     NoRoom(String),
+    /// The certificate stays above the error that was asked for.
+    #[error("{0}")]
+    TooInaccurate(String),
     /// The user asked to stop.
     #[error("cancelled; nothing was written")]
     Cancelled,

@@ -1,6 +1,6 @@
 //! `diaphane-bake inspect`.
 
-use diaphane_formats::asset::{self, Asset};
+use diaphane_formats::asset::{self, Asset, Certificate};
 use diaphane_formats::files;
 use serde_json::{Value, json};
 use std::path::Path;
@@ -40,6 +40,21 @@ fn bytes_per_sample(asset: &Asset, sections: &[(&'static str, usize)]) -> f64 {
     sum as f64 / asset.samples.len().max(1) as f64
 }
 
+/// The certificate in one line.
+pub fn certified(certificate: Option<&Certificate>) -> String {
+    let Some(c) = certificate else { return "no certificate: the bake did not measure it".to_owned() };
+    let with = format!("{} rays in {} views, {} lights, seed {}", c.rays, c.views, c.lights, c.seed);
+    let Some(e) = &c.error else { return format!("not measurable: no light leaves the object ({with})") };
+    format!(
+        "{:.2} % rel. RMSE, {:.1} dB, bias {:+.2} %; interpolation {:.2} %, light representation {:.2} % ({with})",
+        100.0 * e.rel_rmse,
+        e.psnr_db,
+        100.0 * e.bias,
+        100.0 * e.interpolation,
+        100.0 * e.representation
+    )
+}
+
 fn print_text(path: &Path, asset: &Asset, sections: &[(&'static str, usize)], bytes: usize) {
     let i = &asset.info;
     let p = &i.provenance;
@@ -65,6 +80,7 @@ fn print_text(path: &Path, asset: &Asset, sections: &[(&'static str, usize)], by
         "  samples      {} ({} dropped as dark), {} directions, {} bands, {:?}, width factor {}",
         i.samples, i.discarded, p.directions, i.order, i.encoding, i.width_factor
     );
+    println!("  error        {}", certified(i.certificate.as_ref()));
     println!("  per sample   {:.1} bytes", bytes_per_sample(asset, sections));
     for (name, size) in sections {
         println!("    {name:<16} {size:>12} bytes");

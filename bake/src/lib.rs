@@ -1,12 +1,13 @@
 //! Bakes a translucent mesh: thesis chapter 3, algorithms 1 and 2.
 //!
 //! ```text
-//! mesh ─ field ─ layers ─ density ─ samples ─ fit (optical depth, harmonics, weights) ─ pack ─ asset
+//! mesh ─ field ─ layers ─ density ─ samples ─ fit (optical depth, harmonics, weights) ─ pack ─ certificate ─ asset
 //! ```
 //!
 //! A stage imports only the stages before it. Nothing here prints; progress and cancellation go through
 //! [`progress::Progress`].
 
+mod certificate;
 mod density;
 mod error;
 mod field;
@@ -20,6 +21,7 @@ mod samples;
 
 pub use error::{Error, Result};
 
+use certificate::Goal;
 use diaphane_formats::asset::Asset;
 use diaphane_formats::medium::{Density, Medium, SampledDensity};
 use diaphane_formats::mesh::{Mesh, MeshReport};
@@ -63,13 +65,26 @@ impl<'a> Prepared<'a> {
     }
 }
 
-/// Bakes `input`. The same input, parameters and version give the same asset, whatever the number of threads.
+/// Bakes `input`; again with more samples or bands while the certificate exceeds the wanted error, if there is one.
+/// The same input, parameters and version give the same asset, whatever the number of threads.
 ///
 /// # Errors
-/// Parameters out of range, a mesh that leaves no room for samples, cancellation.
+/// Parameters out of range, a mesh that leaves no room for samples, an error that cannot be met, cancellation.
 pub fn bake(input: &Input<'_>, params: &Params, progress: &dyn Progress) -> Result<(Asset, Report)> {
     params.validate()?;
     let mut timed = Timed::new(progress);
+    let mut params = params.clone();
+    let mut goal = Goal::default();
+    loop {
+        let baked = bake_once(input, &params, &mut timed)?;
+        match goal.next(&params, baked.0.info.certificate.as_ref())? {
+            None => return Ok(baked),
+            Some(next) => params = next,
+        }
+    }
+}
+
+fn bake_once(input: &Input<'_>, params: &Params, timed: &mut Timed<'_>) -> Result<(Asset, Report)> {
     let shape = timed.stage("distance field", |p| field::Shape::new(input.mesh, params, p))?;
     let medium = timed.stage("medium", |_| Ok(Prepared::new(input.medium, input.mesh)))?;
     let layers = timed.stage("layers", |p| layers::build(&shape, input.medium, p))?;
@@ -79,8 +94,13 @@ pub fn bake(input: &Input<'_>, params: &Params, progress: &dyn Progress) -> Resu
     let lit = timed.stage("optical depth", |p| fit::depths(&shape, &medium, placed, params, p))?;
     let harmonics = timed.stage("harmonics", |p| fit::harmonics(&lit, params, p))?;
     let weights = timed.stage("weights", |p| fit::weights(&lit, params, p))?;
-    let asset = timed
+    let mut asset = timed
         .stage("packing", |_| pack::pack(input, medium.sampled.as_ref(), params, &lit, harmonics, weights))?;
-    let report = Report::new(params, &shape, &layers, &lit, &asset, timed.seconds);
+    if params.certificate {
+        let measured = timed
+            .stage("certificate", |p| certificate::measure(&shape, &medium, &lit, &asset, params.seed, p))?;
+        asset.info.certificate = Some(measured);
+    }
+    let report = Report::new(params, &shape, &layers, &lit, &asset, &timed.seconds);
     Ok((asset, report))
 }

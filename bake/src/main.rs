@@ -23,7 +23,8 @@ fn main() -> ExitCode {
         Err(error) => {
             let line = one_line(&format!("{error:#}"));
             eprintln!("error: {}", line.strip_prefix("error: ").unwrap_or(&line));
-            ExitCode::from(2)
+            let failed = matches!(error.downcast_ref(), Some(diaphane_bake::Error::TooInaccurate(_)));
+            ExitCode::from(if failed { 1 } else { 2 })
         }
     }
 }

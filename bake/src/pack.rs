@@ -67,6 +67,7 @@ pub(crate) fn pack(
         encoding: params.encoding,
         reference_extinction: medium.reference_extinction(),
         width_factor: params.width_factor,
+        certificate: None,
     };
     let asset = Asset {
         info,

@@ -24,6 +24,10 @@ pub struct Params {
     pub encoding: Encoding,
     /// Full width at half maximum of a kernel in disk radii.
     pub width_factor: f32,
+    /// Whether the bake measures its own error.
+    pub certificate: bool,
+    /// Largest certified relative error; samples or bands are added until it is met.
+    pub max_error: Option<f64>,
 }
 
 /// Directions used to estimate the fluence on the layers.
@@ -69,6 +73,8 @@ impl Params {
             seed: 1,
             encoding: Encoding::RECIPROCAL,
             width_factor: 1.35,
+            certificate: true,
+            max_error: None,
         }
     }
 
@@ -95,7 +101,13 @@ impl Params {
         if !(0.5..=4.0).contains(&self.width_factor) {
             return fail(format!("the width factor must lie within 0.5..4, not {}", self.width_factor));
         }
-        Ok(())
+        match self.max_error {
+            Some(error) if !(error > 0.0 && error.is_finite()) => {
+                fail(format!("--max-error must be above 0, not {error}"))
+            }
+            Some(_) if !self.certificate => fail("--max-error needs the certificate".to_owned()),
+            _ => Ok(()),
+        }
     }
 }
 

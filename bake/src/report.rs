@@ -4,7 +4,7 @@ use crate::field::Shape;
 use crate::fit::Lit;
 use crate::layers::Layer;
 use crate::params::Params;
-use diaphane_formats::asset::{Asset, encode};
+use diaphane_formats::asset::{Asset, Certificate, encode};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -19,7 +19,7 @@ pub struct Report {
     pub sh_order: usize,
     /// Depths computed for the samples.
     pub rays: u64,
-    /// Seconds of each stage, in order of name; `total` is their sum.
+    /// Seconds of each stage, over all bakes that a wanted error took, in order of name; `total` is their sum.
     pub seconds: BTreeMap<String, f64>,
     /// Size of the asset file.
     pub bytes: usize,
@@ -35,6 +35,8 @@ pub struct Report {
     pub skipped: BTreeMap<String, usize>,
     /// What was mended in the mesh, in sentences.
     pub warnings: Vec<String>,
+    /// How far the asset is from the truth; `None` if it was not measured.
+    pub certificate: Option<Certificate>,
     /// What the bake could not do as asked, in sentences.
     pub shortfalls: Vec<String>,
 }
@@ -46,9 +48,12 @@ impl Report {
         layers: &[Layer],
         lit: &Lit,
         asset: &Asset,
-        stages: Vec<(&'static str, f64)>,
+        stages: &[(&'static str, f64)],
     ) -> Self {
-        let mut seconds: BTreeMap<String, f64> = stages.iter().map(|(n, s)| ((*n).to_owned(), *s)).collect();
+        let mut seconds = BTreeMap::new();
+        for (name, s) in stages {
+            *seconds.entry((*name).to_owned()).or_insert(0.0) += s;
+        }
         seconds.insert("total".to_owned(), stages.iter().map(|(_, s)| s).sum());
         let skipped = BTreeMap::from([
             ("distance_queries".to_owned(), shape.skipped_nodes),
@@ -71,6 +76,7 @@ impl Report {
             snapped: lit.snapped,
             layers: layers.len(),
             skipped,
+            certificate: asset.info.certificate,
             shortfalls,
             warnings: asset.info.provenance.mesh_report.warnings(),
         }

@@ -164,8 +164,10 @@ impl Buckets {
         let first = points.first().copied().unwrap_or_default();
         let (low, high) = points.iter().fold((first, first), |(a, b), p| (a.min(*p), b.max(*p)));
         let extent = (high - low).max(Vec3::splat((high - low).max_element() * 1e-3)).max(Vec3::splat(1e-30));
-        let cells = (points.len() as f32 / 2.0).max(1.0);
-        let cell = (extent.x * extent.y * extent.z / cells).cbrt().max(extent.max_element() / 500.0);
+        let cells = (points.len() as f64 / 2.0).max(1.0);
+        // In f64: the volume around a single point is below the smallest f32.
+        let volume = extent.as_dvec3().element_product();
+        let cell = ((volume / cells).cbrt() as f32).max(extent.max_element() / 500.0);
         let inverse = 1.0 / cell;
         let size = (extent * inverse).to_array().map(|e| e as i32 + 1);
         let mut buckets = Self { low, inverse, size, start: Vec::new(), order: vec![0; points.len()] };
@@ -262,6 +264,7 @@ mod tests {
             let stencil = Stencil::new(&samples(count), |_| 1.0);
             let sources = stencil.sources(&vec![Vec3::new(1.0, 0.0, -1.0); count], 1.0);
             assert_eq!(sources.len(), count);
+            assert!(Buckets::new(&stencil.centroid).start.len() <= 500 + 8 * count);
             assert!(sources.iter().all(|s| s.value.is_finite() && s.slope.iter().all(|h| h.is_finite())));
         }
     }

@@ -29,6 +29,14 @@ pub(crate) struct Lit {
     pub rays: u64,
 }
 
+impl Lit {
+    /// ψβ of sample `i` in direction `k` at `ratio` times the reference extinction, as far as the mean tells.
+    pub fn arriving(&self, i: usize, k: usize, ratio: f32) -> f32 {
+        let at = i * self.directions.len() + k;
+        self.transmittance[at].powf(ratio) * self.boundary.get(at).copied().unwrap_or(1.0)
+    }
+}
+
 /// Directions projected before their rows are turned into columns: bounds the memory of the rows.
 const GROUP: usize = 16;
 

@@ -1,5 +1,6 @@
 //! The asset's small metadata.
 
+use super::Certificate;
 use crate::encoding::Encoding;
 use crate::mesh::MeshReport;
 use crate::phase::Phase;
@@ -61,6 +62,8 @@ pub struct Info {
     pub reference_extinction: f64,
     /// Full width at half maximum of a kernel in disk radii.
     pub width_factor: f32,
+    /// How far the asset is from the truth; `None` if the bake did not measure it.
+    pub certificate: Option<Certificate>,
 }
 
 impl Info {
@@ -101,6 +104,6 @@ impl Info {
         if !(diagonal.is_finite() && diagonal > 0.0) {
             return fail("bounding box");
         }
-        Ok(())
+        self.certificate.map_or(Ok(()), |c| c.validate())
     }
 }

@@ -3,6 +3,7 @@
 //! All positions are relative to [`Info::centre`] (the mesh's bounding box centre, kept in f64), so that f32 suffices
 //! wherever the object stands.
 
+mod certificate;
 mod codec;
 mod container;
 mod info;
@@ -10,6 +11,7 @@ mod places;
 mod read;
 mod write;
 
+pub use certificate::{Certificate, CertifiedError};
 pub use info::{Info, Provenance};
 pub use places::Places;
 pub use read::{parse, read, section_sizes};

@@ -164,6 +164,7 @@ impl Object {
                 encoding: self.encoding,
                 reference_extinction: reference,
                 width_factor: 1.5,
+                certificate: None,
             },
             samples,
             mesh_positions: self.positions.iter().map(|p| p.to_array()).collect(),

@@ -133,6 +133,7 @@ pub fn ball(spacing: f64, centre: DVec3, phase: Phase) -> Asset {
             encoding,
             reference_extinction: EXTINCTION,
             width_factor: 1.4,
+            certificate: None,
         },
         samples,
         mesh_positions: mesh.positions.iter().map(|p| p.as_vec3().to_array()).collect(),
