@@ -9,3 +9,4 @@ pub mod metrics;
 pub mod play;
 pub mod reference;
 pub mod report;
+pub mod rivals;
