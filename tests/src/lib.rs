@@ -2,11 +2,14 @@
 //!
 //! ```text
 //! mesh, medium, scene ─> reference ─┐
-//! asset, scene ─> play ─────────────┴─> metrics ─> report (error map, HTML, JSON)
+//! asset, scene ─> play ─────────────┼─> metrics ─┬─> report (error map, HTML, JSON)
+//! mesh, medium, asset ─> rivals ────┘            └─> sweep (table, summary) ─> plot
 //! ```
 
 pub mod metrics;
 pub mod play;
+pub mod plot;
 pub mod reference;
 pub mod report;
 pub mod rivals;
+pub mod sweep;

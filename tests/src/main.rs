@@ -29,6 +29,8 @@ enum Command {
     Image(commands::image::Arguments),
     /// Bake, play and check the built-in objects
     Demo(commands::demo::Arguments),
+    /// Measure run time against error, beside other methods
+    Sweep(Box<commands::sweep::Arguments>),
 }
 
 fn main() -> ExitCode {
@@ -49,6 +51,7 @@ fn main() -> ExitCode {
         Command::Compare(a) => commands::compare::run(&a),
         Command::Image(a) => commands::image::run(&a),
         Command::Demo(a) => commands::demo::run(&a),
+        Command::Sweep(a) => commands::sweep::run(&a),
     };
     match result {
         Ok(true) => ExitCode::SUCCESS,

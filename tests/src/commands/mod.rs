@@ -6,6 +6,7 @@ pub mod image;
 pub mod output;
 pub mod progress;
 pub mod reference;
+pub mod sweep;
 
 use anyhow::Context;
 use diaphane_formats::one_line;

@@ -5,7 +5,7 @@
 //! asset; which nodes are inside, and all precision beyond the asset's bytes, comes free. A node outside, which points
 //! near the boundary need, shares the values of the nearest node inside (in steps along the lattice).
 //!
-//! The coefficients are interpolated, then decoded: one decoding for each light whatever the number of nodes.
+//! Two ways to interpolate, see [`Blend`]; neither is better everywhere, so the caller may try both.
 
 use super::depths::transmittances;
 use super::fit::{Basis, Fitter};
@@ -20,6 +20,18 @@ use std::time::Instant;
 
 /// Distance of the outermost nodes from the box, in diagonals.
 const INSET: f64 = 1e-3;
+
+/// Depths above this are black whatever their value; it keeps ln ψ of a dark node finite.
+const BLACK: f32 = 20.0;
+
+/// What is interpolated between nodes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Blend {
+    /// The coefficients, decoded once for each light. Better where the medium is homogeneous.
+    Values,
+    /// ln ψ, decoded at all eight nodes for each light. Better where the medium is not.
+    Logarithms,
+}
 
 /// What is stored at the nodes.
 #[derive(Clone, Copy, Debug)]
@@ -47,6 +59,8 @@ pub struct Grid {
     order: usize,
     encoding: Encoding,
     ratio: Vec3,
+    /// What is interpolated.
+    pub blend: Blend,
     /// Stored nodes.
     pub stored: usize,
     /// Seconds that it took to make.
@@ -183,7 +197,14 @@ impl Grid {
             encoding: settings.encoding,
             ratio: object.channel_ratio(),
             seconds: begun.elapsed().as_secs_f64(),
+            blend: Blend::Values,
         })
+    }
+
+    /// Coefficients of a stored node.
+    fn node(&self, node: usize) -> &[f32] {
+        let columns = coefficient_count(self.order);
+        &self.coefficients[node * columns..(node + 1) * columns]
     }
 
     /// The stored node and weight of the eight corners around a place.
@@ -210,15 +231,17 @@ impl Grid {
     }
 }
 
-/// Coefficients at a place, and a basis.
+/// What is known of a place, and a basis.
 pub struct Interpolated {
+    corners: [(usize, f32); 8],
     coefficients: [f32; MAX_ORDER * MAX_ORDER],
     basis: [f32; MAX_ORDER * MAX_ORDER],
 }
 
 impl Default for Interpolated {
     fn default() -> Self {
-        Self { coefficients: [0.0; MAX_ORDER * MAX_ORDER], basis: [0.0; MAX_ORDER * MAX_ORDER] }
+        let zeros = [0.0; MAX_ORDER * MAX_ORDER];
+        Self { corners: [(0, 0.0); 8], coefficients: zeros, basis: zeros }
     }
 }
 
@@ -226,23 +249,26 @@ impl Light for Grid {
     type Memory = Interpolated;
 
     fn enter(&self, place: Vec3, memory: &mut Interpolated) {
-        let columns = coefficient_count(self.order);
-        let out = &mut memory.coefficients[..columns];
-        out.fill(0.0);
-        for (node, weight) in self.corners(place) {
-            let stored = &self.coefficients[node * columns..(node + 1) * columns];
-            for (o, c) in out.iter_mut().zip(stored) {
-                *o += weight * c;
+        memory.corners = self.corners(place);
+        if self.blend == Blend::Values {
+            let out = &mut memory.coefficients[..coefficient_count(self.order)];
+            out.fill(0.0);
+            for (node, weight) in memory.corners {
+                for (o, c) in out.iter_mut().zip(self.node(node)) {
+                    *o += weight * c;
+                }
             }
         }
     }
 
     fn arriving(&self, _: Vec3, towards: Vec3, _: f32, memory: &mut Interpolated) -> Vec3 {
-        let columns = coefficient_count(self.order);
         evaluate_f32(self.order, towards.to_array(), &mut memory.basis);
-        let (a, b) = (&memory.coefficients[..columns], &memory.basis[..columns]);
-        let value: f32 = a.iter().zip(b).map(|(c, y)| c * y).sum();
-        let tau = self.encoding.decode(value);
-        if tau == f32::INFINITY { Vec3::ZERO } else { (-self.ratio * tau).exp() }
+        let basis = &memory.basis[..coefficient_count(self.order)];
+        let tau = |c: &[f32]| self.encoding.decode(c.iter().zip(basis).map(|(c, y)| c * y).sum()).min(BLACK);
+        let tau = match self.blend {
+            Blend::Values => tau(&memory.coefficients),
+            Blend::Logarithms => memory.corners.iter().map(|(n, weight)| weight * tau(self.node(*n))).sum(),
+        };
+        if tau >= BLACK { Vec3::ZERO } else { (-self.ratio * tau).exp() }
     }
 }

@@ -41,7 +41,13 @@ impl<L: Light> March<'_, L> {
         draw(self.object, frame, open, |ray, (track, memory)| self.radiance(frame, ray, track, memory))
     }
 
-    fn radiance(&self, frame: &Frame, ray: &CameraRay<'_>, track: &mut Track, memory: &mut L::Memory) -> Vec3 {
+    fn radiance(
+        &self,
+        frame: &Frame,
+        ray: &CameraRay<'_>,
+        track: &mut Track,
+        memory: &mut L::Memory,
+    ) -> Vec3 {
         let kappa = self.object.medium.extinction().as_vec3();
         let grey = self.object.medium.reference_extinction() as f32;
         track.follow(self.object, ray, grey);
@@ -54,11 +60,8 @@ impl<L: Light> March<'_, L> {
         for step in 0..self.steps {
             let u = |x: f32| (step as f32 + x) / self.steps as f32;
             let at: Mark = track.mark(u(ratio), grey, Track::cell(from));
-            let to = if step + 1 == self.steps {
-                track.end()
-            } else {
-                track.mark(u(1.0), grey, Track::cell(at))
-            };
+            let to =
+                if step + 1 == self.steps { track.end() } else { track.mark(u(1.0), grey, Track::cell(at)) };
             let place = ray.origin + ray.direction * at.t;
             sum += track.emission(from, to, kappa) * self.incoming(frame, place, ray.direction, memory);
             from = to;

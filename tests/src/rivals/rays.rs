@@ -73,8 +73,7 @@ fn draw_tile<M>(
         for x in left..right {
             let mut sum = Vec3::ZERO;
             for (k, [dx, dy]) in offsets.iter().enumerate() {
-                let direction =
-                    frame.view.direction(x as f32 + dx, y as f32 + dy, frame.width, frame.height);
+                let direction = frame.view.direction(x as f32 + dx, y as f32 + dy, frame.width, frame.height);
                 let found =
                     segments::trace(&object.accel, object.medium.ior(), origin, direction, &mut scratch);
                 if found.count > 0 {

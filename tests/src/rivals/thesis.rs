@@ -120,8 +120,12 @@ impl<'a> Thesis<'a> {
     pub fn splat(&self, frame: &Frame, sources: &[Vec3], factor: f32) -> Drawn {
         let reach = (-CUT_OFF.ln()).sqrt();
         let sharp: Vec<f32> = self.radius.iter().map(|r| sharpness(*r, factor)).collect();
-        let balls: Vec<(Vec3, f32)> =
-            self.centre.iter().zip(&sharp).map(|(c, a)| (*c - frame.view.origin, 1.001 * reach / a)).collect();
+        let balls: Vec<(Vec3, f32)> = self
+            .centre
+            .iter()
+            .zip(&sharp)
+            .map(|(c, a)| (*c - frame.view.origin, 1.001 * reach / a))
+            .collect();
         let [splats, rays] = [AtomicU64::new(0), AtomicU64::new(0)];
         let open = |tile| {
             let mut chosen = Vec::new();
@@ -192,10 +196,8 @@ mod tests {
 
     #[test]
     fn the_scale_is_the_best_one() {
-        let grey = |values: [f32; 3]| Picture {
-            pixels: values.map(|v| [v; 3]).to_vec(),
-            ..Picture::new(3, 1)
-        };
+        let grey =
+            |values: [f32; 3]| Picture { pixels: values.map(|v| [v; 3]).to_vec(), ..Picture::new(3, 1) };
         let (image, reference) = (grey([1.0, 2.0, 50.0]), grey([2.0, 5.0, 0.0]));
         // (1·2 + 2·5) / (1 + 4); the third pixel is at the edge.
         let scale = best_scale(&image, &reference, &[1.0, 1.0, 0.5]);

@@ -121,9 +121,8 @@ impl Track {
 
     /// Emission between two marks, per channel of extinction `kappa`.
     pub fn emission(&self, from: Mark, to: Mark, kappa: Vec3) -> Vec3 {
-        let up_to = |cell: usize, m: f32| {
-            Vec3::from(kappa.to_array().map(|k| self.cells[cell].emission(k, m)))
-        };
+        let up_to =
+            |cell: usize, m: f32| Vec3::from(kappa.to_array().map(|k| self.cells[cell].emission(k, m)));
         let mut sum = -up_to(from.cell, from.into);
         for cell in from.cell..to.cell {
             sum += up_to(cell, self.cells[cell].length);

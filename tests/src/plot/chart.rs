@@ -1,0 +1,263 @@
+//! Charts: what is drawn, and drawing it.
+
+use super::axis::{Axis, Unit};
+use super::svg::{Anchor, Svg};
+
+/// A measured point.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Point {
+    /// Along the horizontal axis, above 0 (other points are left out).
+    pub x: f64,
+    /// Along the vertical axis, above 0.
+    pub y: f64,
+    /// What it is, shown when the pointer rests on it.
+    pub tip: String,
+    /// A few letters beside it; may be empty.
+    pub mark: String,
+    /// Whether no other point is better in both.
+    pub front: bool,
+}
+
+/// Whether points are neighbours on an axis.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Joined {
+    /// Joined in order, filled markers.
+    Line,
+    /// Apart, hollow markers.
+    No,
+}
+
+/// Points of one kind.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Series {
+    /// In the legend.
+    pub name: String,
+    /// Colour and marker, 0..4.
+    pub style: usize,
+    /// Whether they are joined.
+    pub joined: Joined,
+    /// The points.
+    pub points: Vec<Point>,
+}
+
+/// One pair of axes.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Panel {
+    /// Above it.
+    pub title: String,
+    /// What is in it; the same names in all panels.
+    pub series: Vec<Series>,
+}
+
+/// Panels side by side.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Chart {
+    /// On top.
+    pub title: String,
+    /// Under the title.
+    pub subtitle: String,
+    /// Below the panels, and its unit.
+    pub x: (String, Unit),
+    /// Beside the panels, and its unit.
+    pub y: (String, Unit),
+    /// The panels.
+    pub panels: Vec<Panel>,
+}
+
+const PANEL: [f64; 2] = [380.0, 330.0];
+const LEFT: f64 = 66.0;
+const TOP: f64 = 92.0;
+const BELOW: f64 = 50.0;
+const COLUMNS: usize = 3;
+/// Told apart by the colour-blind too (Okabe and Ito 2008).
+const COLOURS: [&str; 4] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7"];
+const GREY: &str = "#555555";
+
+/// The chart as an SVG file.
+pub fn render(chart: &Chart) -> String {
+    let columns = chart.panels.len().clamp(1, COLUMNS);
+    let rows = chart.panels.len().div_ceil(COLUMNS).max(1);
+    let cell = [PANEL[0] + LEFT + 10.0, PANEL[1] + BELOW + 34.0];
+    let width = columns as f64 * cell[0] + 16.0;
+    let mut svg = Svg::new(width, TOP + rows as f64 * cell[1] + 6.0, &chart.title);
+    svg.label([16.0, 24.0], &chart.title, Anchor::Start, "font-size=\"17\" font-weight=\"bold\"");
+    svg.label([16.0, 43.0], &chart.subtitle, Anchor::Start, &format!("fill=\"{GREY}\""));
+    legend(&mut svg, chart);
+    for (i, panel) in chart.panels.iter().enumerate() {
+        let corner = [(i % COLUMNS) as f64 * cell[0] + LEFT, TOP + (i / COLUMNS) as f64 * cell[1] + 24.0];
+        draw_panel(&mut svg, chart, panel, corner);
+    }
+    svg.finish()
+}
+
+fn legend(svg: &mut Svg, chart: &Chart) {
+    let mut x = 22.0;
+    let y = 66.0;
+    for series in chart.panels.first().map_or(&[][..], |p| &p.series) {
+        marker(svg, series.style, series.joined, [x, y - 4.0], "");
+        svg.label([x + 10.0, y], &series.name, Anchor::Start, "");
+        x += 26.0 + 6.6 * series.name.chars().count() as f64;
+    }
+    svg.polyline(&[[x - 6.0, y - 4.0], [x + 14.0, y - 4.0]], "#000000", 7.0, 0.15);
+    svg.circle([x + 4.0, y - 4.0], 7.5, "none", "#000000", "");
+    svg.label([x + 20.0, y], "front: nothing is better in both", Anchor::Start, "");
+}
+
+fn draw_panel(svg: &mut Svg, chart: &Chart, panel: &Panel, [left, top]: [f64; 2]) {
+    let (right, bottom) = (left + PANEL[0], top + PANEL[1]);
+    let usable = |p: &&Point| p.x > 0.0 && p.y > 0.0 && p.x.is_finite() && p.y.is_finite();
+    let all: Vec<&Point> = panel.series.iter().flat_map(|s| &s.points).filter(usable).collect();
+    let x = Axis::new(all.iter().map(|p| p.x), [left, right]);
+    let y = Axis::new(all.iter().map(|p| p.y), [bottom, top]);
+    svg.label([left, top - 8.0], &panel.title, Anchor::Start, "font-weight=\"bold\"");
+    for (value, labelled) in x.ticks() {
+        let at = x.at(value);
+        svg.line([at, top], [at, bottom], if labelled { "#d5d5d5" } else { "#efefef" }, 1.0);
+        if labelled {
+            svg.label([at, bottom + 16.0], &chart.x.1.label(value), Anchor::Middle, "");
+        }
+    }
+    for (value, labelled) in y.ticks() {
+        let at = y.at(value);
+        svg.line([left, at], [right, at], if labelled { "#d5d5d5" } else { "#efefef" }, 1.0);
+        if labelled {
+            svg.label([left - 6.0, at + 4.0], &chart.y.1.label(value), Anchor::End, "");
+        }
+    }
+    svg.frame([left, top], [right, bottom], GREY);
+    svg.label([0.5 * (left + right), bottom + 36.0], &chart.x.0, Anchor::Middle, "");
+    let (mx, my) = (left - 52.0, 0.5 * (top + bottom));
+    svg.label([mx, my], &chart.y.0, Anchor::Middle, &format!("transform=\"rotate(-90 {mx:.1} {my:.1})\""));
+    let place = |p: &Point| [x.at(p.x), y.at(p.y)];
+    svg.polyline(&staircase(&all, place), "#000000", 7.0, 0.15);
+    for series in &panel.series {
+        let points: Vec<&Point> = series.points.iter().filter(usable).collect();
+        if series.joined == Joined::Line {
+            let line: Vec<[f64; 2]> = points.iter().map(|p| place(p)).collect();
+            svg.polyline(&line, COLOURS[series.style % 4], 1.5, 0.8);
+        }
+        for p in points {
+            let at = place(p);
+            if p.front {
+                svg.circle(at, 7.5, "none", "#000000", "");
+            }
+            marker(svg, series.style, series.joined, at, &p.tip);
+            if !p.mark.is_empty() {
+                let style = format!("font-size=\"10\" fill=\"{}\"", COLOURS[series.style % 4]);
+                svg.label([at[0] + 8.0, at[1] - 6.0], &p.mark, Anchor::Start, &style);
+            }
+        }
+    }
+}
+
+/// The border of what the front's points beat: down at each point, then on to the next.
+fn staircase(points: &[&Point], place: impl Fn(&Point) -> [f64; 2]) -> Vec<[f64; 2]> {
+    let mut front: Vec<[f64; 2]> = points.iter().filter(|p| p.front).map(|p| place(p)).collect();
+    front.sort_unstable_by(|a, b| a[0].total_cmp(&b[0]));
+    let mut line = Vec::new();
+    for (i, p) in front.iter().enumerate() {
+        if i > 0 {
+            line.push([p[0], front[i - 1][1]]);
+        }
+        line.push(*p);
+    }
+    line
+}
+
+/// A disk, triangle, square or diamond.
+fn marker(svg: &mut Svg, style: usize, joined: Joined, [x, y]: [f64; 2], tip: &str) {
+    let colour = COLOURS[style % 4];
+    let fill = if joined == Joined::Line { colour } else { "#ffffff" };
+    let shape =
+        |offsets: &[[f64; 2]]| -> Vec<[f64; 2]> { offsets.iter().map(|[dx, dy]| [x + dx, y + dy]).collect() };
+    match style % 4 {
+        0 => svg.circle([x, y], 4.0, fill, colour, tip),
+        1 => svg.polygon(&shape(&[[-4.5, 4.0], [4.5, 4.0], [0.0, -4.5]]), fill, colour, tip),
+        2 => svg.polygon(&shape(&[[-4.0, -4.0], [4.0, -4.0], [4.0, 4.0], [-4.0, 4.0]]), fill, colour, tip),
+        _ => svg.polygon(&shape(&[[-5.0, 0.0], [0.0, -5.0], [5.0, 0.0], [0.0, 5.0]]), fill, colour, tip),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn chart() -> Chart {
+        let point = |x: f64, y: f64, front: bool| Point {
+            x,
+            y,
+            tip: "1 < 2 & \"three\"\u{7}".to_owned(),
+            mark: "<8>".to_owned(),
+            front,
+        };
+        let series = |style: usize, joined: Joined| Series {
+            name: format!("kind & {style}"),
+            style,
+            joined,
+            points: vec![point(1.0, 0.5, false), point(3.0, 0.1, true), point(0.0, f64::NAN, false)],
+        };
+        let panel = |title: &str| Panel {
+            title: title.to_owned(),
+            series: (0..4).map(|i| series(i, if i == 0 { Joined::No } else { Joined::Line })).collect(),
+        };
+        Chart {
+            title: "a < b".to_owned(),
+            subtitle: "\"quoted\" & more".to_owned(),
+            x: ("time".to_owned(), Unit::Milliseconds),
+            y: ("error".to_owned(), Unit::Percent),
+            panels: vec![panel("one"), panel("two"), panel("three"), panel("four")],
+        }
+    }
+
+    /// Checks that tags nest and close, attributes are quoted, and text holds no bare markup; returns the tags' names.
+    fn check_xml(text: &str) -> Vec<String> {
+        let mut open: Vec<String> = Vec::new();
+        let mut names = Vec::new();
+        let mut rest = text;
+        while let Some(start) = rest.find('<') {
+            let between = &rest[..start];
+            assert!(!between.contains('>'), "bare > in {between}");
+            for (i, _) in between.match_indices('&') {
+                let entities = ["&amp;", "&lt;", "&gt;", "&quot;"];
+                assert!(entities.iter().any(|e| between[i..].starts_with(e)), "bare & in {between}");
+            }
+            let end = start + rest[start..].find('>').expect("a tag ends");
+            let tag = &rest[start + 1..end];
+            rest = &rest[end + 1..];
+            if let Some(name) = tag.strip_prefix('/') {
+                assert_eq!(open.pop().as_deref(), Some(name), "closes another tag");
+                continue;
+            }
+            assert!(!tag.contains('<') && !tag.contains('&'), "{tag}");
+            assert_eq!(tag.matches('"').count() % 2, 0, "{tag}");
+            assert_eq!(tag.matches("=\"").count() * 2, tag.matches('"').count(), "{tag}");
+            let name = tag.trim_end_matches('/').split_whitespace().next().unwrap().to_owned();
+            names.push(name.clone());
+            if !tag.ends_with('/') {
+                open.push(name);
+            }
+        }
+        assert!(open.is_empty() && rest.trim().is_empty(), "{open:?}");
+        names
+    }
+
+    #[test]
+    fn the_file_is_well_formed_and_complete() {
+        let text = render(&chart());
+        let names = check_xml(&text);
+        assert_eq!(names[0], "svg");
+        let count = |n: &str| names.iter().filter(|m| *m == n).count();
+        // Two usable points of three in each of four panels, and the legend: style 0 is a disk, the others polygons.
+        assert_eq!(count("polygon"), 4 * 3 * 2 + 3);
+        // Disks, rings around the front (four series each), and both in the legend.
+        assert_eq!(count("circle"), 4 * 2 + 4 * 4 + 1 + 1);
+        assert!(!text.contains("NaN") && !text.contains("inf"));
+    }
+
+    #[test]
+    fn nothing_to_draw_is_still_a_chart() {
+        check_xml(&render(&Chart { panels: vec![], ..chart() }));
+        let empty = Panel { title: String::new(), series: vec![] };
+        check_xml(&render(&Chart { panels: vec![empty], ..chart() }));
+    }
+}
