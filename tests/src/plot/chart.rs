@@ -71,6 +71,8 @@ const BELOW: f64 = 50.0;
 const COLUMNS: usize = 3;
 /// Told apart by the colour-blind too (Okabe and Ito 2008).
 const COLOURS: [&str; 4] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7"];
+/// The front.
+const FRONT: &str = "#ffe08a";
 const GREY: &str = "#555555";
 
 /// The chart as an SVG file.
@@ -98,7 +100,7 @@ fn legend(svg: &mut Svg, chart: &Chart) {
         svg.label([x + 10.0, y], &series.name, Anchor::Start, "");
         x += 26.0 + 6.6 * series.name.chars().count() as f64;
     }
-    svg.polyline(&[[x - 6.0, y - 4.0], [x + 14.0, y - 4.0]], "#000000", 7.0, 0.15);
+    svg.polyline(&[[x - 6.0, y - 4.0], [x + 14.0, y - 4.0]], FRONT, 7.0);
     svg.circle([x + 4.0, y - 4.0], 7.5, "none", "#000000", "");
     svg.label([x + 20.0, y], "front: nothing is better in both", Anchor::Start, "");
 }
@@ -129,12 +131,12 @@ fn draw_panel(svg: &mut Svg, chart: &Chart, panel: &Panel, [left, top]: [f64; 2]
     let (mx, my) = (left - 52.0, 0.5 * (top + bottom));
     svg.label([mx, my], &chart.y.0, Anchor::Middle, &format!("transform=\"rotate(-90 {mx:.1} {my:.1})\""));
     let place = |p: &Point| [x.at(p.x), y.at(p.y)];
-    svg.polyline(&staircase(&all, place), "#000000", 7.0, 0.15);
+    svg.polyline(&staircase(&all, place), FRONT, 7.0);
     for series in &panel.series {
         let points: Vec<&Point> = series.points.iter().filter(usable).collect();
         if series.joined == Joined::Line {
             let line: Vec<[f64; 2]> = points.iter().map(|p| place(p)).collect();
-            svg.polyline(&line, COLOURS[series.style % 4], 1.5, 0.8);
+            svg.polyline(&line, COLOURS[series.style % 4], 1.5);
         }
         for p in points {
             let at = place(p);

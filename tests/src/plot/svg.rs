@@ -44,12 +44,12 @@ impl Svg {
         );
     }
 
-    pub fn polyline(&mut self, points: &[[f64; 2]], colour: &str, width: f64, opacity: f64) {
+    pub fn polyline(&mut self, points: &[[f64; 2]], colour: &str, width: f64) {
         let list: Vec<String> = points.iter().map(|[x, y]| format!("{x:.1},{y:.1}")).collect();
         let _ = writeln!(
             self.text,
             "<polyline points=\"{}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"{width}\" \
-             stroke-opacity=\"{opacity}\" stroke-linejoin=\"round\"/>",
+             stroke-linejoin=\"round\"/>",
             list.join(" ")
         );
     }

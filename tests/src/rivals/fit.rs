@@ -237,9 +237,9 @@ mod tests {
         basis.apply(&plain, &mut values);
         let plain: f32 = values.iter().zip(&psi).map(|(a, b)| (a.clamp(0.0, 1.0) - b).powi(2)).sum();
         assert!(rms < 0.7 * (plain / 200.0).sqrt(), "{rms} {plain}");
-        // A constant is exact, darkness is zeros.
+        // A constant up to the damping, a relative 1e-4; darkness is zeros.
         fitter.fit(&[0.3; 200], &mut c);
-        assert!(fitter.error(&c, &[0.3; 200]) < 1e-8);
+        assert!((fitter.error(&c, &[0.3; 200]) / 200.0).sqrt() < 2e-4);
         fitter.fit(&[0.0; 200], &mut c);
         assert!(fitter.error(&c, &[0.0; 200]) < 1e-8);
     }

@@ -10,7 +10,7 @@ use crate::plot::{Chart, Joined, Panel, Point, Series, Unit};
 pub enum Against {
     /// Frame time with this many lights.
     Time(usize),
-    /// Bytes that a player needs.
+    /// Bytes of samples or nodes.
     Bytes,
     /// Seconds of the bake.
     Bake,
@@ -20,7 +20,9 @@ impl Against {
     fn axis(self) -> (String, Unit) {
         match self {
             Self::Time(_) => ("time of a frame".to_owned(), Unit::Milliseconds),
-            Self::Bytes => ("bytes a player needs (mesh and density included)".to_owned(), Unit::Bytes),
+            Self::Bytes => {
+                ("bytes of samples or nodes (mesh and density not counted)".to_owned(), Unit::Bytes)
+            }
             Self::Bake => ("time of the bake".to_owned(), Unit::Seconds),
         }
     }
@@ -28,7 +30,7 @@ impl Against {
     fn value(self, record: &Record) -> f64 {
         match self {
             Self::Time(_) => record.outcome.frame_ms[1],
-            Self::Bytes => record.outcome.bytes as f64,
+            Self::Bytes => record.outcome.light_bytes as f64,
             Self::Bake => record.outcome.bake_s,
         }
     }
@@ -51,8 +53,8 @@ pub fn chart(records: &[Record], base: Base, against: Against, lights: usize, ba
                 .filter(|r| r.key.case == *case && r.key.lights == lights)
                 // Rivals have no twin on the GPU and stand in every chart.
                 .filter(|r| r.key.backend == backend || r.key.method != Method::Splats)
-                // Marching bakes nothing: it has no place on an axis of bake times.
-                .filter(|r| against != Against::Bake || r.key.method != Method::March)
+                // Marching stores and bakes nothing: it has no place on those axes.
+                .filter(|r| matches!(against, Against::Time(_)) || r.key.method != Method::March)
                 .collect();
             Panel { title: (*case).to_owned(), series: series(&here, base, against) }
         })
@@ -136,7 +138,7 @@ fn tip(record: &Record) -> String {
     }
     parts.push(format!("{:.2} %", 100.0 * o.rel_rmse));
     parts.push(Unit::Milliseconds.label(o.frame_ms[1]));
-    parts.push(Unit::Bytes.label(o.bytes as f64));
+    parts.push(Unit::Bytes.label(o.bytes as f64) + " in all");
     if !o.note.is_empty() {
         parts.push(o.note.clone());
     }

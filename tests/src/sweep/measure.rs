@@ -199,7 +199,7 @@ pub fn recipe(thesis: &Thesis<'_>, frame: &Frame, reference: &Known, frames: usi
         picture: scaled(drawn.picture, scale),
         frame_ms,
         splats_per_ray: drawn.splats_per_ray,
-        note: format!("width {factor}, scale {scale:.3}"),
+        note: format!("width {factor}; scale {scale:.3}"),
     })
 }
 

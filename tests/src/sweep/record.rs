@@ -65,6 +65,8 @@ pub struct Key {
 pub struct Outcome {
     /// Bytes that a player needs: samples or nodes, mesh, density.
     pub bytes: usize,
+    /// Bytes of the samples or nodes among them: what serves the light alone.
+    pub light_bytes: usize,
     /// Bytes of a sample or node; 0 where there are none.
     pub bytes_per_sample: f64,
     /// Seconds of the bake, or of what takes its place.
@@ -123,6 +125,7 @@ pub mod samples {
         };
         let outcome = Outcome {
             bytes: 10,
+            light_bytes: 5,
             bytes_per_sample: 1.0,
             bake_s: 0.1,
             frame_ms: [1.0, 2.0, 3.0],

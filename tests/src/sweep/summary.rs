@@ -158,7 +158,7 @@ fn crossings(records: &[&Record], base: Base) -> Vec<Crossing> {
             let (verdict, at) = crossover(*error, *cost, &marcher)?;
             let (words, lights) = match verdict {
                 Verdict::Always => ("splats are faster for any number of lights".to_owned(), None),
-                Verdict::From(n) => (format!("splats are faster from {} lights on", n.ceil()), Some(n)),
+                Verdict::From(n) => (format!("splats are faster from {:.0} lights on", n.ceil()), Some(n)),
                 Verdict::Until(n) => (format!("splats are faster up to {} lights", n.floor()), Some(n)),
                 Verdict::Never => ("the marcher is faster for any number of lights".to_owned(), None),
                 Verdict::OutOfReach => ("the marcher does not reach this error".to_owned(), None),
@@ -228,7 +228,7 @@ pub fn text(summaries: &[CaseSummary]) -> String {
         );
         for r in &s.recipe {
             lines.push(format!(
-                "  {:>6} samples, {:>3} lights: {:>6.2} % / {:>6.2} % = {:.1}",
+                "  {:>6} samples, lights: {:>3}: {:>6.2} % / {:>6.2} % = {:.1}",
                 r.samples,
                 r.lights,
                 100.0 * r.recipe,
@@ -262,7 +262,7 @@ pub fn text(summaries: &[CaseSummary]) -> String {
                 (_, None) => "  (no splats get there)".to_owned(),
             };
             lines.push(format!(
-                "  {:>3} lights, {:>4.0} %: {} ({}), {:.0} ms, {:.2} %{instead}",
+                "  lights: {:>3}, {:>4.0} %: {} ({}), {:.0} ms, {:.2} %{instead}",
                 f.lights,
                 100.0 * f.target,
                 f.method.name(),

@@ -4,7 +4,7 @@ use super::record::Record;
 
 /// Names of the columns.
 const COLUMNS: &str = "case,method,samples,order,encoding,directions,preset,steps,lights,backend,bytes,\
-                       bytes_per_sample,bake_s,frame_ms_min,frame_ms_median,frame_ms_max,splats_per_ray,rel_rmse,\
+                       light_bytes,bytes_per_sample,bake_s,frame_ms_min,frame_ms_median,frame_ms_max,splats_per_ray,rel_rmse,\
                        psnr_db,bias,p99_rel,non_finite,reference_noise,adapter,note";
 
 /// The whole table. What does not apply is empty.
@@ -25,6 +25,7 @@ pub fn csv(records: &[Record]) -> String {
             key.lights.to_string(),
             key.backend.clone(),
             o.bytes.to_string(),
+            o.light_bytes.to_string(),
             if o.bytes_per_sample > 0.0 { format!("{:.1}", o.bytes_per_sample) } else { String::new() },
             format!("{:.3}", o.bake_s),
             format!("{:.3}", o.frame_ms[0]),
@@ -68,7 +69,7 @@ mod tests {
         let lines: Vec<&str> = text.lines().collect();
         assert_eq!(lines.len(), 3);
         assert_eq!(lines[1].split(',').count(), COLUMNS.split(',').count());
-        assert!(lines[1].starts_with("ball,splats,5,5,reciprocal,64,standard,,8,cpu,10,"), "{}", lines[1]);
+        assert!(lines[1].starts_with("ball,splats,5,5,reciprocal,64,standard,,8,cpu,10,5,"), "{}", lines[1]);
         assert!(lines[2].starts_with("\"a,\"\"b\"\"\",splats,7,"), "{}", lines[2]);
     }
 }

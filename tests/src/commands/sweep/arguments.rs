@@ -134,7 +134,7 @@ impl Arguments {
         let list = |given: &Option<Vec<usize>>, full: &[usize], short: &[usize]| -> Vec<usize> {
             given.clone().unwrap_or_else(|| if quick { short.to_vec() } else { full.to_vec() })
         };
-        let base = list(&self.base, &[8_000, 7, 256], &[2_000, 5, 64]);
+        let base = list(&self.base, &[8_000, 7, 256], &[2_000, 7, 128]);
         let [samples, order, directions] = base[..] else {
             anyhow::bail!("--base takes three numbers (samples, bands, directions), not {}", base.len());
         };
@@ -146,9 +146,9 @@ impl Arguments {
         let axes = Axes {
             base: Base { samples, order, directions },
             samples: list(&self.samples, &[1_000, 2_000, 4_000, 8_000, 16_000, 32_000], &[500, 2_000, 8_000]),
-            orders: list(&self.orders, &[3, 5, 7, 9], &[3, 7]),
+            orders: list(&self.orders, &[3, 5, 7, 9], &[3, 5]),
             encodings: self.encodings.clone(),
-            directions: list(&self.directions, &[64, 128, 256, 512], &[128]),
+            directions: list(&self.directions, &[64, 128, 256, 512], &[64]),
             presets: names(&presets, "--presets", |n| PresetName::from_str(n, true).ok())?,
             pair_samples: list(&self.pair_samples, &[2_000, 8_000, 32_000], &[]),
             pair_orders: list(&self.pair_orders, &[5, 7, 9], &[]),

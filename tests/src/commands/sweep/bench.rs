@@ -29,7 +29,7 @@ pub struct Bench<'a> {
 
 /// Size and making of what was drawn.
 struct Stored {
-    bytes: usize,
+    light_bytes: usize,
     sample_bytes: f64,
     seconds: f64,
 }
@@ -56,7 +56,8 @@ impl<'a> Bench<'a> {
         };
         let metrics = measure::judge(&shot.picture, reference)?;
         Ok(Outcome {
-            bytes: stored.bytes,
+            bytes: self.made.shared_bytes + stored.light_bytes,
+            light_bytes: stored.light_bytes,
             bytes_per_sample: stored.sample_bytes,
             bake_s: stored.seconds,
             frame_ms: shot.frame_ms,
@@ -85,7 +86,7 @@ impl<'a> Bench<'a> {
     fn asset_stored(&self) -> Stored {
         let samples = self.made.asset.samples.len() as f64;
         Stored {
-            bytes: self.made.shared_bytes + (samples * self.made.sample_bytes).round() as usize,
+            light_bytes: (samples * self.made.sample_bytes).round() as usize,
             sample_bytes: self.made.sample_bytes,
             seconds: self.made.seconds,
         }
@@ -102,7 +103,7 @@ impl<'a> Bench<'a> {
             self.thesis.get_or_insert_with(|| Thesis::new(object, &made.asset, self.baked.directions));
         let shot = measure::recipe(thesis, &frame, reference, self.frames)?;
         let stored = Stored {
-            bytes: made.shared_bytes + made.asset.samples.len() * thesis::BYTES,
+            light_bytes: made.asset.samples.len() * thesis::BYTES,
             sample_bytes: thesis::BYTES as f64,
             seconds: made.placing_seconds + thesis.seconds,
         };
@@ -114,7 +115,7 @@ impl<'a> Bench<'a> {
         let object = self.object;
         let light = &*self.shadows.get_or_insert_with(|| Shadows::new(object));
         let shot = measure::march(&March { object, steps, light }, &frame, self.frames)?;
-        Ok((shot, Stored { bytes: self.made.shared_bytes, sample_bytes: 0.0, seconds: 0.0 }))
+        Ok((shot, Stored { light_bytes: 0, sample_bytes: 0.0, seconds: 0.0 }))
     }
 
     fn grid(&mut self, steps: usize, scene: &Scene, reference: &Known) -> anyhow::Result<(Shot, Stored)> {
@@ -128,7 +129,7 @@ impl<'a> Bench<'a> {
         };
         let shot = measure::through_grid(self.object, grid, steps, &frame, reference, self.frames)?;
         let stored = Stored {
-            bytes: self.made.shared_bytes + (grid.stored as f64 * self.made.function_bytes) as usize,
+            light_bytes: (grid.stored as f64 * self.made.function_bytes) as usize,
             sample_bytes: self.made.function_bytes,
             seconds: grid.seconds,
         };

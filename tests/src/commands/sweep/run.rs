@@ -148,7 +148,7 @@ impl<'a> Sweep<'a> {
         let hash = case.hash(&format!("{:?} {settings:?}", scene.lights));
         let name = format!("{}-{lights}-{hash}", case.name);
         let wanted = references::Wanted { mesh: &case.mesh, medium: &case.medium, scene: &scene, settings };
-        display.note(&format!("{}: reference with {lights} lights", case.name));
+        display.note(&format!("{}: reference, lights: {lights}", case.name));
         let (known, warning) = references::obtain(&self.folder, &name, &wanted, &|_| ())?;
         warn(warning.as_slice());
         Ok(known)
@@ -161,5 +161,5 @@ fn describe(key: &Key) -> String {
         Method::March => format!("{} steps", key.steps),
         _ => format!("{} samples, {} bands, {}", key.samples, key.order, key.encoding),
     };
-    format!("{} {} ({setting}), {} lights", key.case, key.method.name(), key.lights)
+    format!("{} {} ({setting}), lights: {}", key.case, key.method.name(), key.lights)
 }
