@@ -10,3 +10,6 @@ mod svg;
 
 pub use axis::Unit;
 pub use chart::{Chart, Joined, Panel, Point, Series, render};
+
+#[cfg(test)]
+mod tests;

@@ -18,6 +18,7 @@
 pub mod depths;
 pub mod fit;
 pub mod grid;
+mod lattice;
 pub mod march;
 pub mod object;
 pub mod rays;

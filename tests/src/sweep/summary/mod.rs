@@ -1,6 +1,10 @@
 //! What a sweep shows, in figures that a person can check against the table: the distance to the published recipe, the
 //! number of lights from which splats are faster than marching, and where something else is the better choice.
 
+mod text;
+
+pub use text::text;
+
 use super::analysis::{Cost, Rival, Verdict, crossover};
 use super::plan::Base;
 use super::record::{Key, Method, Record};
@@ -216,64 +220,6 @@ fn setting(key: &Key) -> String {
             format!("{} samples, {} bands, {}", key.samples, key.order, key.backend)
         }
     }
-}
-
-/// The summaries as text.
-pub fn text(summaries: &[CaseSummary]) -> String {
-    let mut lines = Vec::new();
-    for s in summaries {
-        lines.push(format!("== {} ==", s.case));
-        lines.push(
-            "Error of the published recipe (its best width and scale) over ours, equal samples:".to_owned(),
-        );
-        for r in &s.recipe {
-            lines.push(format!(
-                "  {:>6} samples, lights: {:>3}: {:>6.2} % / {:>6.2} % = {:.1}",
-                r.samples,
-                r.lights,
-                100.0 * r.recipe,
-                100.0 * r.splats,
-                r.ratio
-            ));
-        }
-        lines.push("Against the ray marcher at equal error:".to_owned());
-        for c in &s.crossovers {
-            let marcher = match (c.march_ms, c.march_steps) {
-                (Some([fixed, each]), Some(steps)) => {
-                    format!("; marcher {fixed:.0} + {each:.1} ms a light at {steps:.1} steps")
-                }
-                _ => String::new(),
-            };
-            lines.push(format!(
-                "  {:>6} samples on the {}, {:.2} %, {:.0} + {:.2} ms a light{marcher}: {}",
-                c.samples,
-                c.backend,
-                100.0 * c.error,
-                c.splats_ms[0],
-                c.splats_ms[1],
-                c.verdict
-            ));
-        }
-        lines.push("Fastest below an error:".to_owned());
-        for f in &s.fastest {
-            let instead = match (f.method, f.splats_ms) {
-                (Method::Splats, _) => String::new(),
-                (_, Some(ms)) => format!("  (splats: {ms:.0} ms)"),
-                (_, None) => "  (no splats get there)".to_owned(),
-            };
-            lines.push(format!(
-                "  lights: {:>3}, {:>4.0} %: {} ({}), {:.0} ms, {:.2} %{instead}",
-                f.lights,
-                100.0 * f.target,
-                f.method.name(),
-                f.setting,
-                f.frame_ms,
-                100.0 * f.error
-            ));
-        }
-        lines.push(String::new());
-    }
-    lines.join("\n")
 }
 
 #[cfg(test)]
