@@ -95,7 +95,10 @@ pub fn render(chart: &Chart) -> String {
 fn legend(svg: &mut Svg, chart: &Chart) {
     let mut x = 22.0;
     let y = 66.0;
-    for series in chart.panels.first().map_or(&[][..], |p| &p.series) {
+    let used = |name: &str| {
+        chart.panels.iter().flat_map(|p| &p.series).any(|s| s.name == name && !s.points.is_empty())
+    };
+    for series in chart.panels.first().map_or(&[][..], |p| &p.series).iter().filter(|s| used(&s.name)) {
         marker(svg, series.style, series.joined, [x, y - 4.0], "");
         svg.label([x + 10.0, y], &series.name, Anchor::Start, "");
         x += 26.0 + 6.6 * series.name.chars().count() as f64;

@@ -145,7 +145,7 @@ impl Arguments {
         };
         let axes = Axes {
             base: Base { samples, order, directions },
-            samples: list(&self.samples, &[1_000, 2_000, 4_000, 8_000, 16_000, 32_000], &[500, 2_000, 8_000]),
+            samples: list(&self.samples, &[1_000, 2_000, 4_000, 8_000, 16_000, 32_000], &[500, 2_000, 4_000]),
             orders: list(&self.orders, &[3, 5, 7, 9], &[3, 5]),
             encodings: self.encodings.clone(),
             directions: list(&self.directions, &[64, 128, 256, 512], &[64]),
