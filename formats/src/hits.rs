@@ -105,24 +105,28 @@ impl Chunk {
 }
 
 /// The part of each lane's support inside a piece, and its weight (0 where there is none).
+#[derive(Clone, Copy)]
 struct Clipped {
     from: Lanes,
     length: Lanes,
     weight: Lanes,
 }
 
+/// Parts of a kernel's support where the density varies: each has its own mean density and attenuation.
+pub const PARTS: usize = 3;
+
 impl Clipped {
-    /// The near and the far half of every support: where the density changes within one, each half has its own.
-    fn halves(&self) -> [Self; 2] {
-        let length = self.length.map(|l| 0.5 * l);
-        let mut middle = self.from;
-        for k in 0..LANES {
-            middle[k] += length[k];
-        }
-        [
-            Self { from: self.from, length, weight: self.weight },
-            Self { from: middle, length, weight: self.weight },
-        ]
+    /// Equal parts of every support, the nearest first.
+    fn parts(&self) -> [Self; PARTS] {
+        let length = self.length.map(|l| l * (1.0 / PARTS as f32));
+        let mut part = Self { from: self.from, length, weight: self.weight };
+        std::array::from_fn(|_| {
+            let own = part;
+            for k in 0..LANES {
+                part.from[k] += length[k];
+            }
+            own
+        })
     }
 }
 
@@ -203,7 +207,7 @@ impl Hits {
             };
             match along {
                 Along::Uniform(_) => add_part(&whole),
-                Along::Profile(..) => whole.halves().iter().for_each(add_part),
+                Along::Profile(..) => whole.parts().iter().for_each(add_part),
             }
         }
         if grey {

@@ -6,8 +6,8 @@
 //!
 //! A constant source comes out exactly. Within a kernel the source varies as its [`Source`] says; v_i above is its
 //! mean under the kernel's weight (see [`crate::hits`]). In a homogeneous medium W_i is the closed form of [`crate::kernel`] and
-//! A = 1 - e^{-κ(t1-t0)}. Otherwise a [`Profile`] of the density along the piece supplies τ at the ends and in the
-//! middle of the kernel's support; between them τ is taken as linear, and σ is the mean scattering density of each half.
+//! A = 1 - e^{-κ(t1-t0)}. Otherwise a [`Profile`] of the density along the piece supplies τ at the ends of three
+//! equal parts of the kernel's support; in each part τ is taken as linear, and σ is its mean scattering density.
 //! (The thesis sums v_i ∫γ_i dt alone, equation 3.4.)
 
 use crate::asset::{DensityGrid, Samples};
@@ -277,12 +277,12 @@ mod tests {
             };
             let (Along::Uniform(kappa) | Along::Profile(kappa, _)) = along;
             let across = *centre - origin - direction * tc;
-            let middle = 0.5 * (from + to);
             let parts = match along {
-                Along::Uniform(_) => vec![(from, to)],
-                Along::Profile(..) => vec![(from, middle), (middle, to)],
+                Along::Uniform(_) => 1,
+                Along::Profile(..) => crate::hits::PARTS,
             };
-            for (from, to) in parts {
+            let size = (to - from) / parts as f32;
+            for (from, to) in (0..parts).map(|p| (from + size * p as f32, from + size * (p + 1) as f32)) {
                 let (before, density, scattering) = match along {
                     Along::Uniform(_) => (from - start, 1.0, 1.0),
                     Along::Profile(_, p) => {

@@ -2,11 +2,15 @@
 //!
 //! ```text
 //! mesh, medium, scene ─> reference ─┐
-//! asset, scene ─> play ─────────────┴─> metrics ─> report (error map, HTML, JSON)
+//! asset, scene ─> play ─────────────┼─> metrics ─┬─> report (error map, HTML, JSON)
+//! mesh, medium, asset ─> rivals ────┘            └─> sweep (table, summary) ─> plot
 //! ```
 
 pub mod metrics;
 pub mod play;
+pub mod plot;
 pub mod range;
 pub mod reference;
 pub mod report;
+pub mod rivals;
+pub mod sweep;

@@ -31,6 +31,8 @@ enum Command {
     Demo(commands::demo::Arguments),
     /// Bake, play and check a table of media, lights and views
     Range(commands::range::Arguments),
+    /// Measure run time against error, beside other methods
+    Sweep(Box<commands::sweep::Arguments>),
 }
 
 fn main() -> ExitCode {
@@ -52,6 +54,7 @@ fn main() -> ExitCode {
         Command::Image(a) => commands::image::run(&a),
         Command::Demo(a) => commands::demo::run(&a),
         Command::Range(a) => commands::range::run(&a),
+        Command::Sweep(a) => commands::sweep::run(&a),
     };
     match result {
         Ok(true) => ExitCode::SUCCESS,

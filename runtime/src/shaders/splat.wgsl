@@ -12,6 +12,7 @@ override HETEROGENEOUS: bool = false;   // the medium has a density profile
 
 const SOURCE: u32 = 4u;
 const MOST_EXPONENT: f32 = 4.0;
+const PARTS: u32 = 3u;
 const CELL: u32 = 8u;
 const MOST_CELLS: u32 = 64u;
 
@@ -145,8 +146,8 @@ fn add(in: Splat) -> Sums {
     let slope = vec3f(dot(in.slope_r, direction), dot(in.slope_g, direction), dot(in.slope_b, direction));
     var numerator = vec3f(0.0);
     var denominator = vec3f(0.0);
-    // Where the density changes within the support, each half has its own.
-    let parts = select(1u, 2u, HETEROGENEOUS);
+    // Where the density varies, each part of the support has its own.
+    let parts = select(1u, PARTS, HETEROGENEOUS);
     let size = (ends.y - ends.x) / f32(parts);
     for (var part = 0u; part < parts; part++) {
         let near = ends.x + f32(part) * size;

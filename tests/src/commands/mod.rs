@@ -7,6 +7,7 @@ pub mod output;
 pub mod progress;
 pub mod range;
 pub mod reference;
+pub mod sweep;
 
 use anyhow::Context;
 use diaphane_formats::one_line;

@@ -164,3 +164,48 @@ impl diaphane_bake::progress::Progress for RowDisplay {
         false
     }
 }
+
+/// Shows how many of a number of like steps are done, and how long the rest will take.
+pub struct Steps {
+    bar: Option<ProgressBar>,
+    total: usize,
+    finished: std::sync::atomic::AtomicUsize,
+    begun: std::time::Instant,
+}
+
+impl Steps {
+    /// A display of `total` steps, none of them done.
+    pub fn new(total: usize) -> Self {
+        let bar = std::io::stderr().is_terminal().then(|| {
+            let bar = ProgressBar::new(total as u64);
+            let style = ProgressStyle::with_template("{bar:24} {pos}/{len}  {eta_precise} left  {msg}");
+            bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+            bar
+        });
+        Self { bar, total, finished: 0.into(), begun: std::time::Instant::now() }
+    }
+
+    /// What is being done now, where there is a bar.
+    pub fn note(&self, what: &str) {
+        if let Some(bar) = &self.bar {
+            bar.set_message(what.to_owned());
+        }
+    }
+
+    /// One more is done; where there is no bar its result is a line.
+    pub fn done(&self, result: &str) {
+        let done = self.finished.fetch_add(1, std::sync::atomic::Ordering::Relaxed) + 1;
+        let left = self.begun.elapsed().as_secs_f64() * self.total.saturating_sub(done) as f64 / done as f64;
+        match &self.bar {
+            Some(bar) => bar.inc(1),
+            None => tell(&format!("[{done}/{}] {result}; about {left:.0} s left", self.total)),
+        }
+    }
+
+    /// Takes the bar away.
+    pub fn finish(&self) {
+        if let Some(bar) = &self.bar {
+            bar.finish_and_clear();
+        }
+    }
+}
