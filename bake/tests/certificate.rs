@@ -20,7 +20,14 @@ fn jade() -> Medium {
 }
 
 fn small() -> Params {
-    Params { samples: 600, directions: 64, points_per_sample: 4, order: 4, ..Params::preset(Preset::Draft) }
+    Params {
+        samples: 600,
+        directions: 64,
+        points_per_sample: 4,
+        order: 4,
+        light_error: 0.0,
+        ..Params::preset(Preset::Draft)
+    }
 }
 
 fn run(medium: &Medium, params: &Params) -> Result<Asset> {

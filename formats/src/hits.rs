@@ -122,9 +122,7 @@ impl Clipped {
         let mut part = Self { from: self.from, length, weight: self.weight };
         std::array::from_fn(|_| {
             let own = part;
-            for k in 0..LANES {
-                part.from[k] += length[k];
-            }
+            part.from.iter_mut().zip(&length).for_each(|(from, length)| *from += length);
             own
         })
     }

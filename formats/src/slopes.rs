@@ -8,7 +8,7 @@
 //! with c the centroids at which the values hold. The vectors M⁻¹ w_j d_j depend on the samples alone and are kept
 //! ([`Stencil`]); a frame only sums. |h| is limited to six times the extinction: light at grazing angles fades faster
 //! than e^{-κ depth}. A [`Source`] then stands for v(x) = value · e^{h·(x-b)} around its kernel's centre b, which is
-//! always positive.
+//! always positive. Where samples are sparse |h| is limited to two per disk radius as well.
 //!
 //! What a sample stores is its mean over the inside part of a ball around b. The mean of an exponential is greater
 //! than its value at the centroid, by about e^{h·C·h/2} with C the covariance of the points; for a ball of radius R cut by a
@@ -26,6 +26,9 @@ use rayon::prelude::*;
 pub const NEIGHBOURS: usize = 14;
 /// Slopes are limited to this multiple of the largest extinction.
 pub const LIMIT: f32 = 6.0;
+/// Slopes are limited to this per disk radius: steeper ones come from noise between neighbours, which they would amplify
+/// (600 samples with four bands in a ball: error 0.36 without this limit, 0.08 with it).
+pub const STEEPEST: f32 = 2.0;
 /// Radius of the ball that a sample's values are the mean of, in disk radii.
 pub const CELL_RADIUS: f32 = 0.65;
 /// |ln| of the ratio between neighbours is limited to this, so that darkness has a finite slope.
@@ -89,7 +92,12 @@ impl Stencil {
             spokes,
             to_centre: (0..n).map(|i| samples.position(i) - centroid[i]).collect(),
             variance: samples.position_radius.iter().map(|p| (CELL_RADIUS * p[3]).powi(2) / 5.0).collect(),
-            limit: centroid.par_iter().map(|c| (LIMIT * extinction(*c)).min(1e30)).collect(),
+            limit: (0..n)
+                .into_par_iter()
+                .map(|i| {
+                    (LIMIT * extinction(centroid[i])).min(STEEPEST / samples.position_radius[i][3]).min(1e30)
+                })
+                .collect(),
             centroid,
         }
     }

@@ -12,7 +12,7 @@ fn parameters() {
         ("--samples", "0"),
         ("--directions", "0"),
         ("--sh-order", "0"),
-        ("--sh-order", "11"),
+        ("--sh-order", "15"),
         ("--threads", "0"),
     ] {
         bench.refuses(

@@ -46,4 +46,6 @@ pub fn bake_body(body: &Body, placed: &Placed, params: &Params, progress: &dyn P
 pub fn dye(asset: &mut Asset, material: &Material) {
     asset.info.albedo = material.albedo;
     asset.info.phase = material.phase;
+    // It was measured with another material.
+    asset.info.certificate = None;
 }
