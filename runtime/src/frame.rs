@@ -5,11 +5,14 @@ use crate::exact::ExactDepths;
 use diaphane_formats::asset::Info;
 use diaphane_formats::directions::even_directions;
 use diaphane_formats::scene::{Environment, Light, Scene, Surface};
-use diaphane_formats::sh::{self, MAX_ORDER};
+use diaphane_formats::sh;
 use glam::{DVec3, Vec3};
 
 /// Directions that stand for an environment: each becomes one directional light.
 pub const ENVIRONMENT_DIRECTIONS: usize = 256;
+
+/// Bands that an environment is reduced to: what [`ENVIRONMENT_DIRECTIONS`] can carry.
+const ENVIRONMENT_ORDER: usize = 10;
 
 /// A light's distance is clamped from below at this fraction of the diagonal.
 pub const LEAST_DISTANCE: f64 = 1e-3;
@@ -193,17 +196,17 @@ fn frame_light(light: &Light, centre: DVec3) -> FrameLight {
     }
 }
 
-/// The environment projected to [`MAX_ORDER`] bands of spherical harmonics, then evaluated in even directions, each a
+/// The environment projected to [`ENVIRONMENT_ORDER`] bands of spherical harmonics, then evaluated in even directions, each a
 /// directional light with irradiance radiance × 4π / count.
 fn environment_lights(environment: &Environment) -> Vec<FrameLight> {
     let coefficients = project_environment(environment);
     let directions = even_directions(ENVIRONMENT_DIRECTIONS, 0);
     let solid_angle = 4.0 * std::f64::consts::PI / directions.len() as f64;
-    let mut basis = [0.0; MAX_ORDER * MAX_ORDER];
+    let mut basis = [0.0; ENVIRONMENT_ORDER * ENVIRONMENT_ORDER];
     directions
         .into_iter()
         .map(|towards| {
-            sh::evaluate(MAX_ORDER, towards.to_array(), &mut basis);
+            sh::evaluate(ENVIRONMENT_ORDER, towards.to_array(), &mut basis);
             let radiance: DVec3 = coefficients.iter().zip(&basis).map(|(c, y)| *c * *y).sum();
             FrameLight {
                 kind: LightKind::Directional,
@@ -221,8 +224,8 @@ fn environment_lights(environment: &Environment) -> Vec<FrameLight> {
 fn project_environment(environment: &Environment) -> Vec<DVec3> {
     use std::f64::consts::{PI, TAU};
     let picture = &environment.picture;
-    let mut sum = vec![DVec3::ZERO; MAX_ORDER * MAX_ORDER];
-    let mut basis = [0.0; MAX_ORDER * MAX_ORDER];
+    let mut sum = vec![DVec3::ZERO; ENVIRONMENT_ORDER * ENVIRONMENT_ORDER];
+    let mut basis = [0.0; ENVIRONMENT_ORDER * ENVIRONMENT_ORDER];
     for row in 0..picture.height {
         let theta = PI * (row as f64 + 0.5) / picture.height as f64;
         // Exact solid angle of the row's band, shared by its pixels.
@@ -232,7 +235,7 @@ fn project_environment(environment: &Environment) -> Vec<DVec3> {
         for column in 0..picture.width {
             let phi = TAU * ((column as f64 + 0.5) / picture.width as f64 - 0.5);
             let direction = [theta.sin() * phi.sin(), theta.cos(), -theta.sin() * phi.cos()];
-            sh::evaluate(MAX_ORDER, direction, &mut basis);
+            sh::evaluate(ENVIRONMENT_ORDER, direction, &mut basis);
             let p = picture.pixels[row * picture.width + column];
             let radiance =
                 DVec3::new(p[0].into(), p[1].into(), p[2].into()) * environment.scale * solid_angle;
