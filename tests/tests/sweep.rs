@@ -90,7 +90,7 @@ fn bad_usage_is_one_line() {
         bench.refuses("validate", &[&["sweep"], arguments].concat(), says);
     };
     refuses(&["--steps", "0"], "--steps");
-    refuses(&["--orders", "5,11"], "--orders");
+    refuses(&["--orders", "5,15"], "--orders");
     refuses(&["--samples", "many"], "--samples");
     refuses(&["--base", "100,5"], "--base");
     refuses(&["--lights", "0"], "--lights");

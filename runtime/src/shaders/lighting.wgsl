@@ -40,18 +40,25 @@ fn expanded(word: u32, bits: u32, unit: f32) -> f32 {
     return sign(q) * unit * u * sqrt(u);
 }
 
+// Word of a code, and the code's first bit there: code `k` of a band, of codes that start at byte `start`.
+fn place(start: u32, band: Band, k: u32) -> vec2u {
+    let at = 8u * (start & 3u) + band.before + k * band.bits;
+    return vec2u((start >> 2u) + (at >> 5u), at & 31u);
+}
+
+// A word that begins with bit `shift` of `low`.
 fn field(low: u32, high: u32, shift: u32) -> u32 {
     return select(low >> shift, (low >> shift) | (high << (32u - shift)), shift > 0u);
 }
 
+// A function cannot be handed a storage buffer: one loop for each.
 fn decode_depth(start: u32, order: u32, scale: f32) {
     for (var l = 0u; l < order; l++) {
         let band = bands[l];
         for (var k = 0u; k < 2u * l + 1u; k++) {
-            let at = 8u * (start & 3u) + band.before + k * band.bits;
-            let word = (start >> 2u) + (at >> 5u);
-            of_depth[l * l + k] =
-                expanded(field(depth[word], depth[word + 1u], at & 31u), band.bits, scale * band.depth);
+            let at = place(start, band, k);
+            let word = field(depth[at.x], depth[at.x + 1u], at.y);
+            of_depth[l * l + k] = expanded(word, band.bits, scale * band.depth);
         }
     }
 }
@@ -60,10 +67,9 @@ fn decode_boundary(start: u32, scale: f32) {
     for (var l = 0u; l < BOUNDARY_ORDER; l++) {
         let band = bands[l];
         for (var k = 0u; k < 2u * l + 1u; k++) {
-            let at = 8u * (start & 3u) + band.before + k * band.bits;
-            let word = (start >> 2u) + (at >> 5u);
-            of_boundary[l * l + k] =
-                expanded(field(boundary[word], boundary[word + 1u], at & 31u), band.bits, scale * band.boundary);
+            let at = place(start, band, k);
+            let word = field(boundary[at.x], boundary[at.x + 1u], at.y);
+            of_boundary[l * l + k] = expanded(word, band.bits, scale * band.boundary);
         }
     }
 }

@@ -2,6 +2,7 @@
 
 use anyhow::ensure;
 use clap::ValueEnum;
+use diaphane_formats::sh::MAX_ORDER;
 use std::path::PathBuf;
 use validation::sweep::case::Size;
 use validation::sweep::plan::{Axes, Base, EncodingName, PresetName};
@@ -63,7 +64,7 @@ pub struct Arguments {
         value_name = "LIST",
         value_delimiter = ',',
         value_enum,
-        default_value = "reciprocal,transmittance"
+        default_value = "reciprocal,lobe,depth,transmittance"
     )]
     pub encodings: Vec<EncodingName>,
     /// Numbers of directions
@@ -134,7 +135,7 @@ impl Arguments {
         let list = |given: &Option<Vec<usize>>, full: &[usize], short: &[usize]| -> Vec<usize> {
             given.clone().unwrap_or_else(|| if quick { short.to_vec() } else { full.to_vec() })
         };
-        let base = list(&self.base, &[8_000, 7, 256], &[2_000, 7, 128]);
+        let base = list(&self.base, &[8_000, 10, 512], &[2_000, 10, 512]);
         let [samples, order, directions] = base[..] else {
             anyhow::bail!("--base takes three numbers (samples, bands, directions), not {}", base.len());
         };
@@ -146,12 +147,12 @@ impl Arguments {
         let axes = Axes {
             base: Base { samples, order, directions },
             samples: list(&self.samples, &[1_000, 2_000, 4_000, 8_000, 16_000, 32_000], &[500, 2_000, 4_000]),
-            orders: list(&self.orders, &[3, 5, 7, 9], &[3, 5]),
+            orders: list(&self.orders, &[3, 5, 7, 10, 14], &[3, 5, 7]),
             encodings: self.encodings.clone(),
-            directions: list(&self.directions, &[64, 128, 256, 512], &[64]),
+            directions: list(&self.directions, &[64, 128, 256, 512, 1_024], &[128]),
             presets: names(&presets, "--presets", |n| PresetName::from_str(n, true).ok())?,
             pair_samples: list(&self.pair_samples, &[2_000, 8_000, 32_000], &[]),
-            pair_orders: list(&self.pair_orders, &[5, 7, 9], &[]),
+            pair_orders: list(&self.pair_orders, &[5, 7, 10], &[]),
             steps: list(&self.steps, &[1, 2, 4, 8, 16, 32], &[1, 2, 4, 8]),
             grid_steps: self.grid_steps,
             lights: self.lights.clone(),
@@ -169,9 +170,9 @@ impl Arguments {
         within("--base", &one(axes.base.samples), 1..=20_000_000)?;
         within("--samples", &axes.samples, 1..=20_000_000)?;
         within("--pair-samples", &axes.pair_samples, 1..=20_000_000)?;
-        within("--base", &one(axes.base.order), 1..=10)?;
-        within("--orders", &axes.orders, 1..=10)?;
-        within("--pair-orders", &axes.pair_orders, 1..=10)?;
+        within("--base", &one(axes.base.order), 1..=MAX_ORDER)?;
+        within("--orders", &axes.orders, 1..=MAX_ORDER)?;
+        within("--pair-orders", &axes.pair_orders, 1..=MAX_ORDER)?;
         within("--base", &one(axes.base.directions), 1..=65_536)?;
         within("--directions", &axes.directions, 1..=65_536)?;
         within("--steps", &axes.steps, 1..=4_096)?;
