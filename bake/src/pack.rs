@@ -36,9 +36,9 @@ pub(crate) fn pack(
     let offset = lit
         .samples
         .iter()
-        .zip(&lit.centroids)
-        .map(|(s, c)| {
-            let [x, y, z] = ((*c - s.position) * (127.0 / s.radius)).round().clamp(LEAST, MOST).to_array();
+        .enumerate()
+        .map(|(i, s)| {
+            let [x, y, z] = ((lit.cells.centroid(i) - s.position) * (127.0 / s.radius)).round().clamp(LEAST, MOST).to_array();
             [x as i8, y as i8, z as i8, 0]
         })
         .collect();

@@ -3,12 +3,13 @@
 //! ```text
 //! views (rays) ─┬─ truth (quadrature, exact light) ─┐
 //!               └─ play (the packed samples) ───────┴─ pool ─ certificate
+//! cells ─ exact ─┘
 //! ```
 //!
-//! Each pair of a view and lights is a small picture. The share of interpolation comes from playing exact light: the
-//! transmittance of the fit's own directions is at hand for every sample, so the directions nearest to some of the
-//! held-out lights are played without harmonics, against a truth of their own.
+//! Each pair of a view and lights is a small picture. The share of interpolation comes from playing some of the lights
+//! without harmonics: the exact mean of the transmittance over each sample's cell takes their place.
 
+mod exact;
 mod goal;
 mod play;
 mod pool;
@@ -23,7 +24,6 @@ use crate::progress::Stage;
 use crate::{Prepared, Result};
 use diaphane_formats::asset::{self, Asset, Certificate, CertifiedError};
 use diaphane_formats::directions::{even_directions, hash};
-use glam::DVec3;
 use play::{Player, Stored};
 use pool::Pictures;
 use truth::Nodes;
@@ -32,9 +32,8 @@ use truth::Nodes;
 const VIEWS: usize = 16;
 /// Held-out directions of light, a multiple of the channels.
 const LIGHTS: usize = 18;
-/// Held-out lights whose neighbours among the fit's directions are played with exact light: two for each channel, on
-/// both sides of the sphere.
-const NEIGHBOURED: [usize; 6] = [0, 4, 8, 9, 13, 17];
+/// Held-out lights that are played with exact light too: two for each channel, on both sides of the sphere.
+const EXACT: [usize; 6] = [0, 4, 8, 9, 13, 17];
 
 /// Measures `packed` with views, rays and lights drawn from `seed`.
 pub(crate) fn measure(
@@ -45,7 +44,7 @@ pub(crate) fn measure(
     seed: u64,
     stage: Stage<'_>,
 ) -> Result<Certificate> {
-    stage.announce(VIEWS + 2 * (LIGHTS + NEIGHBOURED.len()));
+    stage.announce(VIEWS + 2 * (LIGHTS + EXACT.len()));
     // As a reader gets it, after all rounding.
     let asset = asset::parse(&asset::encode(packed)?)?;
     let stream = hash(seed, 71);
@@ -61,17 +60,15 @@ pub(crate) fn measure(
     let pictures =
         Pictures { views: &views, lights: &lights, phase: asset.info.phase, truth: &truth, played: &played };
 
-    let column = NEIGHBOURED.map(|l| nearest(&lit.directions, lights[l]));
-    let directions = column.map(|k| lit.directions[k]);
-    let near_truth = nodes.radiance(shape, medium, &directions, stage)?;
-    let ratio = medium.medium.extinction() / medium.medium.reference_extinction().max(f64::MIN_POSITIVE);
-    let exact = |i: usize, l: usize| lit.arriving(i, column[l], ratio[l % 3] as f32);
-    let near_played = player.radiance(NEIGHBOURED.len(), exact, stage)?;
-    let near = Pictures { lights: &directions, truth: &near_truth, played: &near_played, ..pictures };
+    let exact = exact::means(shape, medium, lit, EXACT.map(|l| (lights[l], l % 3)), stage)?;
+    let played = player.radiance(EXACT.len(), |i, l| exact[l][i], stage)?;
+    let exact_lights = EXACT.map(|l| lights[l]);
+    let exact_truth = EXACT.map(|l| truth[l].clone());
+    let near = Pictures { lights: &exact_lights, truth: &exact_truth, played: &played, ..pictures };
 
     let error = pictures.figures().map(|figures| {
-        let with_exact_light = near.single(0..NEIGHBOURED.len());
-        let with_stored_light = pictures.single(NEIGHBOURED);
+        let with_exact_light = near.single(0..EXACT.len());
+        let with_stored_light = pictures.single(EXACT);
         let share = match (with_exact_light, with_stored_light) {
             (Some(exact), Some(stored)) if stored > 0.0 => (exact / stored).min(1.0),
             _ => 1.0,
@@ -85,10 +82,4 @@ pub(crate) fn measure(
         }
     });
     Ok(Certificate { error, rays, views: VIEWS as u32, lights: LIGHTS as u32, seed })
-}
-
-/// Index of the direction closest to `wanted`; 0 if there is none.
-fn nearest(directions: &[DVec3], wanted: DVec3) -> usize {
-    let closer = |a: &usize, b: &usize| directions[*a].dot(wanted).total_cmp(&directions[*b].dot(wanted));
-    (0..directions.len()).max_by(closer).unwrap_or(0)
 }

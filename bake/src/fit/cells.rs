@@ -1,64 +1,129 @@
-//! The region that a sample stands for: a few points spread through the inside part of the ball around it.
+//! The region that a sample stands for: points spread through the inside part of the ball around it.
 //!
 //! Light at a grazing angle fades within a fraction of the samples' spacing, so its value at a point says little about
-//! the neighbourhood that the kernel stands for. Every sample therefore carries the mean of ψ over these points, valid
-//! at their centroid up to the correction of [`diaphane_formats::slopes`].
+//! the neighbourhood that the kernel stands for. Every sample therefore carries the mean of ψ over such points, valid
+//! at their centroid up to the correction of [`diaphane_formats::slopes`]. Each direction looks at a few of them in
+//! turn: the fit over all directions averages the rest (see [`super::depths`]). Where the density varies points are as
+//! frequent as the medium scatters, because that is how much their light counts.
+//!
+//! Points follow the additive recurrence of the generalised golden ratio in three dimensions (Roberts 2018), shifted at
+//! random for each sample: any run of consecutive ones is spread well.
 
 use crate::Result;
 use crate::field::{Shape, inside_nodes};
 use crate::samples::Candidate;
 use diaphane_formats::directions::hash;
+use diaphane_formats::medium::Medium;
 use diaphane_formats::slopes::CELL_RADIUS;
 use glam::DVec3;
-use rand::{RngExt, SeedableRng};
-use rand_pcg::Pcg64Mcg;
 use rayon::prelude::*;
 
 /// Tries for each point that is wanted; samples on the boundary lose about half.
 const TRIES: usize = 3;
 
-/// `count` points for each sample, row-major [sample][point].
-pub(super) fn points(
-    shape: &Shape<'_>,
-    samples: &[Candidate],
-    count: usize,
-    seed: u64,
-) -> Result<Vec<DVec3>> {
-    if count <= 1 {
-        return Ok(samples.iter().map(|s| s.position).collect());
-    }
-    let tries: Vec<DVec3> = samples
-        .par_iter()
-        .enumerate()
-        .flat_map_iter(|(i, s)| {
-            let mut rng = Pcg64Mcg::seed_from_u64(hash(seed, i as u64));
-            (0..TRIES * count)
-                .map(move |_| s.position + in_ball(&mut rng) * (f64::from(CELL_RADIUS) * s.radius))
-        })
-        .collect();
-    let inside = inside_nodes(shape.mesh, &tries)?;
-    let width = TRIES * count;
-    Ok(samples
-        .par_iter()
-        .enumerate()
-        .flat_map_iter(|(i, s)| {
-            let own = i * width..(i + 1) * width;
-            let mut kept: Vec<DVec3> = own.filter(|k| inside[*k]).map(|k| tries[k]).take(count).collect();
-            if kept.is_empty() {
-                kept.push(s.position);
-            }
-            // Too few found: those count more than once.
-            let found = kept.len();
-            (0..count).map(move |k| kept[k % found])
-        })
-        .collect())
+/// The recurrence's steps: powers of the root of x⁴ = x + 1.
+const STEPS: DVec3 = DVec3::new(0.819_172_513_396_164_4, 0.671_043_606_703_789_3, 0.549_700_477_901_970_3);
+
+/// The points of all samples.
+pub(crate) struct Cells {
+    /// Row-major [sample][point].
+    points: Vec<DVec3>,
+    /// Points of a sample.
+    pub size: usize,
 }
 
-fn in_ball(rng: &mut Pcg64Mcg) -> DVec3 {
-    loop {
-        let p = DVec3::new(rng.random(), rng.random(), rng.random()) * 2.0 - 1.0;
-        if p.length_squared() < 1.0 {
-            return p;
+impl Cells {
+    /// `size` points for each sample.
+    pub fn new(
+        shape: &Shape<'_>,
+        medium: &Medium,
+        samples: &[Candidate],
+        size: usize,
+        seed: u64,
+    ) -> Result<Self> {
+        if size <= 1 {
+            return Ok(Self { points: samples.iter().map(|s| s.position).collect(), size: 1 });
         }
+        let width = TRIES * size;
+        let tries: Vec<DVec3> = samples
+            .par_iter()
+            .enumerate()
+            .flat_map_iter(|(i, s)| {
+                let radius = f64::from(CELL_RADIUS) * s.radius;
+                in_ball(hash(seed, i as u64)).take(width).map(move |p| s.position + p * radius)
+            })
+            .collect();
+        let inside = inside_nodes(shape.mesh, &tries)?;
+        let points = samples
+            .par_iter()
+            .enumerate()
+            .flat_map_iter(|(i, s)| {
+                let own = i * width..(i + 1) * width;
+                let found: Vec<DVec3> = own.filter(|k| inside[*k]).map(|k| tries[k]).collect();
+                let even = medium.is_homogeneous().then(|| found.iter().copied().take(size).collect());
+                let mut kept: Vec<DVec3> = even.unwrap_or_else(|| as_scattering(medium, &found, size));
+                if kept.is_empty() {
+                    kept.push(s.position);
+                }
+                // Too few found: those count more than once.
+                let found = kept.len();
+                (0..size).map(move |k| kept[k % found])
+            })
+            .collect();
+        Ok(Self { points, size })
     }
+
+    /// All points, those of a sample together.
+    pub fn points(&self) -> &[DVec3] {
+        &self.points
+    }
+
+    /// The points of sample `i`.
+    pub fn of(&self, i: usize) -> &[DVec3] {
+        &self.points[i * self.size..(i + 1) * self.size]
+    }
+
+    /// The mean of the points of sample `i`: where its values hold.
+    pub fn centroid(&self, i: usize) -> DVec3 {
+        self.of(i).iter().sum::<DVec3>() / self.size as f64
+    }
+
+    /// `count` points of every sample, row-major [sample][point], others at every turn; `count` divides the size.
+    pub fn turn(&self, turn: usize, count: usize) -> Vec<DVec3> {
+        let stride = self.size / count;
+        self.points.iter().skip(turn % stride).step_by(stride).copied().collect()
+    }
+
+    /// Keeps the samples that `keep` says.
+    pub fn retain(&mut self, keep: &[bool]) {
+        let mut cell = 0;
+        self.points.retain(|_| {
+            cell += 1;
+            keep[(cell - 1) / self.size]
+        });
+    }
+}
+
+/// `size` of `found`, each as often as its share of the scattering density says; none where nothing scatters.
+fn as_scattering(medium: &Medium, found: &[DVec3], size: usize) -> Vec<DVec3> {
+    let mut total = 0.0;
+    let cumulative: Vec<f64> = found
+        .iter()
+        .map(|p| {
+            total += medium.density_and_scattering(*p).1;
+            total
+        })
+        .collect();
+    if !(total > 0.0) {
+        return Vec::new();
+    }
+    let mass = |k: usize| (k as f64 + 0.5) / size as f64 * total;
+    (0..size).map(|k| found[cumulative.partition_point(|c| *c <= mass(k)).min(found.len() - 1)]).collect()
+}
+
+/// Points of the unit ball.
+fn in_ball(seed: u64) -> impl Iterator<Item = DVec3> {
+    let unit = |k: u64| hash(seed, k) as f64 / 2f64.powi(64);
+    let shift = DVec3::new(unit(0), unit(1), unit(2));
+    (0..).map(move |k| (shift + STEPS * f64::from(k)).fract() * 2.0 - 1.0).filter(|p| p.length_squared() < 1.0)
 }

@@ -1,6 +1,10 @@
 //! Optical depth of every sample in every direction, by projecting the mesh along each.
+//!
+//! ψ of a sample is a mean over its cell. One direction sees a few of the cell's points, the next one others: the fit
+//! over all directions is smooth, so that few rays each average the cell as well as many would (measured at 20,000
+//! samples and equal rays: see README).
 
-use super::cells;
+use super::cells::Cells;
 use crate::field::Shape;
 use crate::params::{DARK, Params};
 use crate::progress::Stage;
@@ -14,11 +18,12 @@ use rayon::prelude::*;
 /// Samples that receive light, with their transmittance.
 pub(crate) struct Lit {
     pub samples: Vec<Candidate>,
-    /// Where the values below hold: the mean of the points that each sample stands for.
-    pub centroids: Vec<DVec3>,
+    /// What each sample stands for.
+    pub cells: Cells,
     pub probes: Vec<Candidate>,
+    /// Unit vectors: the first half, then their opposites in the same order.
     pub directions: Vec<DVec3>,
-    /// ψ at the reference extinction, mean over each sample's points, row-major [sample][direction].
+    /// ψ at the reference extinction, mean over some of each sample's points, row-major [sample][direction].
     pub transmittance: Vec<f32>,
     /// Fresnel transmittance products in the same order, weighted by ψ; empty when index matched.
     pub boundary: Vec<f32>,
@@ -29,16 +34,11 @@ pub(crate) struct Lit {
     pub rays: u64,
 }
 
-impl Lit {
-    /// ψβ of sample `i` in direction `k` at `ratio` times the reference extinction, as far as the mean tells.
-    pub fn arriving(&self, i: usize, k: usize, ratio: f32) -> f32 {
-        let at = i * self.directions.len() + k;
-        self.transmittance[at].powf(ratio) * self.boundary.get(at).copied().unwrap_or(1.0)
-    }
-}
+/// Points of a cell for each one that a direction sees.
+const TURNS: usize = 4;
 
-/// Directions projected before their rows are turned into columns: bounds the memory of the rows.
-const GROUP: usize = 16;
+/// Pairs of opposite directions projected before their rows are turned into columns: bounds the memory of the rows.
+const GROUP: usize = 8;
 
 pub(crate) fn depths(
     shape: &Shape<'_>,
@@ -47,51 +47,57 @@ pub(crate) fn depths(
     params: &Params,
     stage: Stage<'_>,
 ) -> Result<Lit> {
-    let directions = even_directions(params.directions, hash(params.seed, 31));
-    let per_sample = params.points_per_sample;
-    let points = cells::points(shape, &placed.samples, per_sample, hash(params.seed, 37))?;
+    let pairs = even_directions(params.directions.next_multiple_of(2), hash(params.seed, 31));
+    let forward: Vec<DVec3> = pairs.iter().step_by(2).copied().collect();
+    let half = forward.len();
+    let directions: Vec<DVec3> = forward.iter().copied().chain(forward.iter().map(|d| -*d)).collect();
+    let count = params.points_per_sample;
+    let size = if count == 1 { 1 } else { TURNS * count };
+    let mut cells = Cells::new(shape, medium.medium, &placed.samples, size, hash(params.seed, 37))?;
     let (n, d) = (placed.samples.len(), directions.len());
-    stage.announce(d.div_ceil(2));
+    stage.announce(half);
     let matched = medium.medium.ior() == 1.0;
     let kappa = medium.medium.reference_extinction() as f32;
     let mut transmittance = vec![0.0f32; n * d];
     let mut boundary = vec![1.0f32; if matched { 0 } else { n * d }];
     let mut outside_votes = vec![0u32; n];
-    for (g, group) in directions.chunks(GROUP).enumerate() {
+    for (g, group) in forward.chunks(GROUP).enumerate() {
         let rows: Vec<DepthRows> = group
-            .par_chunks(2)
-            .map(|pair| {
-                let rows = project_with(shape.mesh, medium.medium, medium.for_rays(), &points, pair[0]);
+            .par_iter()
+            .enumerate()
+            .map(|(k, axis)| {
+                let points = cells.turn(g * GROUP + k, count);
+                let rows = project_with(shape.mesh, medium.medium, medium.for_rays(), &points, *axis);
                 stage.step(1)?;
                 Ok(rows)
             })
             .collect::<Result<_>>()?;
-        let column = |k: usize| (&rows[k / 2], k % 2);
-        transmittance.par_chunks_mut(d).zip(&mut outside_votes).enumerate().for_each(|(i, (out, votes))| {
-            let own = i * per_sample..(i + 1) * per_sample;
-            for k in 0..group.len() {
-                let (row, side) = column(k);
-                let lengths = if side == 0 { &row.forward } else { &row.backward };
-                let sum: f32 = lengths[own.clone()].iter().map(|m| (-kappa * m).exp()).sum();
-                out[g * GROUP + k] = sum / per_sample as f32;
-                *votes += row.winding[side][own.clone()].iter().filter(|w| **w <= 0).count() as u32;
+        // Calls `put` with each column, its row and which side of the row it is.
+        let columns = |put: &mut dyn FnMut(usize, &DepthRows, usize)| {
+            for (k, row) in rows.iter().enumerate() {
+                (0..2).for_each(|side| put(side * half + g * GROUP + k, row, side));
             }
+        };
+        transmittance.par_chunks_mut(d).zip(&mut outside_votes).enumerate().for_each(|(i, (out, votes))| {
+            let own = i * count..(i + 1) * count;
+            columns(&mut |at, row, side| {
+                let sum: f32 = row.lengths(side)[own.clone()].iter().map(|m| (-kappa * m).exp()).sum();
+                out[at] = sum / count as f32;
+                *votes += row.winding[side][own.clone()].iter().filter(|w| **w <= 0).count() as u32;
+            });
         });
         if !matched {
             boundary.par_chunks_mut(d).enumerate().for_each(|(i, out)| {
-                let own = i * per_sample..(i + 1) * per_sample;
-                for k in 0..group.len() {
-                    let (row, side) = column(k);
-                    let lengths = if side == 0 { &row.forward } else { &row.backward };
+                columns(&mut |at, row, side| {
                     let (mut through, mut all) = (0.0f32, 0.0f32);
-                    for q in own.clone() {
+                    for q in i * count..(i + 1) * count {
                         // A little more than ψ, so that darkness divides no zero by zero.
-                        let psi = (-kappa * lengths[q]).exp() + 1e-6;
+                        let psi = (-kappa * row.lengths(side)[q]).exp() + 1e-6;
                         through += psi * row.boundary[side][q];
                         all += psi;
                     }
-                    out[g * GROUP + k] = through / all;
-                }
+                    out[at] = through / all;
+                });
             });
         }
     }
@@ -103,7 +109,7 @@ pub(crate) fn depths(
             let light: f32 = psi.iter().enumerate().map(|(k, psi)| psi * through(k)).sum();
             // The layers decided before; the mean over the points of a sample on the boundary of a dense medium may lie
             // far below, yet it is all the light there is: only what is dark beyond doubt goes now.
-            let outside = 2 * outside_votes[i] as usize > d * per_sample;
+            let outside = 2 * outside_votes[i] as usize > d * count;
             f64::from(light) / d as f64 >= 1e-3 * DARK && !outside
         })
         .collect();
@@ -116,15 +122,11 @@ pub(crate) fn depths(
         if !matched {
             compact(&mut boundary, &keep, d);
         }
+        cells.retain(&keep);
     }
-    let mean = |points: &[DVec3]| points.iter().sum::<DVec3>() / points.len() as f64;
-    let kept_only = |i: &usize| keep[*i];
     Ok(Lit {
-        samples: (0..n).filter(kept_only).map(|i| placed.samples[i]).collect(),
-        centroids: (0..n)
-            .filter(kept_only)
-            .map(|i| mean(&points[i * per_sample..(i + 1) * per_sample]))
-            .collect(),
+        samples: (0..n).filter(|i| keep[*i]).map(|i| placed.samples[i]).collect(),
+        cells,
         probes: placed.probes,
         directions,
         transmittance,
@@ -132,7 +134,7 @@ pub(crate) fn depths(
         discarded: n - kept,
         snapped: placed.snapped,
         dark_candidates: placed.dark,
-        rays: (n * per_sample * d) as u64,
+        rays: (n * count * d) as u64,
     })
 }
 

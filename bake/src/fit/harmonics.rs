@@ -7,16 +7,15 @@
 //! starts from the coefficients of the one before or from a linear fit, whichever is nearer. What is kept is quantised ([`diaphane_formats::harmonics`]).
 
 use super::depths::Lit;
-use super::least_squares::{BATCH, Batch};
+use super::least_squares::{BATCH, Basis, Batch, coefficient_places};
 use crate::Result;
 use crate::params::Params;
 use crate::progress::Stage;
 use diaphane_formats::encoding::Encoding;
 use diaphane_formats::harmonics::{Coefficients, Harmonics};
-use diaphane_formats::sh::{coefficient_count, evaluate};
 use glam::{DVec3, Vec3};
 use half::f16;
-use ndarray::{Array2, Axis, Slice};
+use ndarray::Array2;
 use rayon::prelude::*;
 
 /// The light of all samples.
@@ -57,7 +56,7 @@ pub(crate) fn harmonics(lit: &Lit, params: &Params, stage: Stage<'_>) -> Result<
     let n = lit.samples.len();
     let columns = lit.directions.len();
     stage.announce(n);
-    let basis = basis(&lit.directions, params.order);
+    let basis = Basis::new(&lit.directions, params.order.max(BOUNDARY_ORDER));
     let tasks: Vec<Vec<Fitted>> = lit
         .transmittance
         .par_chunks(TASK * columns)
@@ -80,16 +79,6 @@ pub(crate) fn harmonics(lit: &Lit, params: &Params, stage: Stage<'_>) -> Result<
     Ok(Light { depth: depth.quantised(), lobe, boundary: boundary(lit, &basis, params) })
 }
 
-fn basis(directions: &[DVec3], order: usize) -> Array2<f32> {
-    let mut out = Array2::zeros((directions.len(), coefficient_count(order)));
-    let mut row = vec![0.0; coefficient_count(order)];
-    for (d, mut out) in directions.iter().zip(out.rows_mut()) {
-        evaluate(order, d.to_array(), &mut row);
-        out.iter_mut().zip(&row).for_each(|(o, r)| *o = *r as f32);
-    }
-    out
-}
-
 /// Orders that are tried, upwards.
 fn ladder(highest: usize) -> Vec<usize> {
     let mut orders: Vec<usize> = (LEAST_ORDER..=highest).rev().step_by(2).collect();
@@ -98,7 +87,7 @@ fn ladder(highest: usize) -> Vec<usize> {
 }
 
 /// Fits the samples of one task; `psi` holds their transmittances, row-major [sample][direction].
-fn fit(psi: &[f32], lit: &Lit, basis: &Array2<f32>, params: &Params) -> Vec<Fitted> {
+fn fit(psi: &[f32], lit: &Lit, basis: &Basis, params: &Params) -> Vec<Fitted> {
     let columns = lit.directions.len();
     let mut out: Vec<Fitted> = (0..psi.len() / columns).map(|_| Fitted::default()).collect();
     let mut open: Vec<usize> = (0..out.len()).collect();
@@ -112,8 +101,7 @@ fn fit(psi: &[f32], lit: &Lit, basis: &Array2<f32>, params: &Params) -> Vec<Fitt
         let mut still = Vec::new();
         for group in open.chunks(BATCH) {
             let rows = Array2::from_shape_fn((group.len(), columns), |(q, d)| psi[group[q] * columns + d]);
-            let basis = basis.slice_axis(Axis(1), Slice::from(..coefficient_count(*order)));
-            let batch = Batch { basis, lobe: None };
+            let batch = Batch { basis: basis.bands(*order), lobe: None };
             let before: Vec<&Fitted> = group.iter().map(|i| &out[*i]).collect();
             let steps = STEPS[usize::from(last)];
             let fitted = fit_batch(&rows, &before, batch, &lit.directions, params.encoding, steps);
@@ -144,6 +132,7 @@ fn fit_batch(
 ) -> Vec<Fitted> {
     let n = batch.unknowns();
     let order = n.isqrt();
+    let places = coefficient_places(order);
     let axes: Vec<Vec3> = if encoding.has_lobe() {
         (0..before.len()).map(|q| brightest(psi.row(q).iter(), directions)).collect()
     } else {
@@ -157,7 +146,7 @@ fn fit_batch(
         if before.iter().any(|b| !b.coefficients.is_empty()) {
             let warm = Array2::from_shape_fn(x.dim(), |(q, k)| match k {
                 k if k == n => before[q].lobe.length(),
-                k => before[q].coefficients.get(k).copied().unwrap_or(0.0),
+                k => before[q].coefficients.get(places[k]).copied().unwrap_or(0.0),
             });
             batch.take_better(encoding, psi, &warm, &mut x);
         }
@@ -166,7 +155,7 @@ fn fit_batch(
     };
     let taken = |x: &Array2<f32>, errors: &[f32], q: usize, lobe: Vec3| Fitted {
         order,
-        coefficients: x.row(q).iter().take(n).copied().collect(),
+        coefficients: in_order(&places, x.row(q).iter()),
         lobe,
         error: errors[q],
     };
@@ -184,19 +173,27 @@ fn fit_batch(
         .collect()
 }
 
+/// Coefficients from unknowns whose places `places` tells; what follows them is left out.
+fn in_order<'a>(places: &[usize], unknowns: impl Iterator<Item = &'a f32>) -> Vec<f32> {
+    let mut out = vec![0.0; places.len()];
+    places.iter().zip(unknowns).for_each(|(at, x)| out[*at] = *x);
+    out
+}
+
 /// The direction of the first moment of ψ: towards the nearest surface, where that is near.
 fn brightest<'a>(psi: impl Iterator<Item = &'a f32>, directions: &[DVec3]) -> Vec3 {
     psi.zip(directions).map(|(psi, d)| f64::from(*psi) * *d).sum::<DVec3>().normalize_or_zero().as_vec3()
 }
 
 /// Linear fit weighted by the transmittance of the medium: the boundary matters where light arrives.
-fn boundary(lit: &Lit, basis: &Array2<f32>, params: &Params) -> Harmonics {
+fn boundary(lit: &Lit, basis: &Basis, params: &Params) -> Harmonics {
     if lit.boundary.is_empty() {
         return Harmonics::default();
     }
     let order = params.order.min(BOUNDARY_ORDER);
-    let (n, columns) = (coefficient_count(order), lit.directions.len());
-    let batch = Batch { basis: basis.slice_axis(Axis(1), Slice::from(..n)), lobe: None };
+    let columns = lit.directions.len();
+    let batch = Batch { basis: basis.bands(order), lobe: None };
+    let places = coefficient_places(order);
     let rows: Vec<Vec<f32>> = lit
         .boundary
         .par_chunks(BATCH * columns)
@@ -205,7 +202,8 @@ fn boundary(lit: &Lit, basis: &Array2<f32>, params: &Params) -> Harmonics {
             let shape = (through.len() / columns, columns);
             let weight = Array2::from_shape_fn(shape, |(q, d)| psi[q * columns + d] + 0.02);
             let right = Array2::from_shape_fn(shape, |(q, d)| through[q * columns + d] * weight[[q, d]]);
-            batch.linear(&weight, &right, &vec![1e-4; shape.0]).iter().copied().collect()
+            let x = batch.linear(&weight, &right, &vec![1e-4; shape.0]);
+            x.rows().into_iter().flat_map(|x| in_order(&places, x.iter())).collect()
         })
         .collect();
     let mut out = Coefficients::zeros(vec![order as u8; lit.samples.len()]);

@@ -3,11 +3,17 @@
 //!
 //! For values y = B x (B: directions × coefficients) decoded to ψ̂(y) it minimises Σ_ω (ψ̂ - ψ)². A step solves
 //! min |g (B d) - (ψ - ψ̂)|² + λ |d|² with g = dψ̂/dy. B has nearly orthogonal columns and g lies within 0..1, so ten
-//! iterations suffice and no normal matrix is ever formed: products of 32 functions with B cost a fifth of that.
+//! iterations suffice and no normal matrix is ever formed.
+//!
+//! Directions come in opposite pairs, all first ones before all second ones, and Y_lm(-ω) = (-1)^l Y_lm(ω): with E and O
+//! the parts of even and odd bands in the first half, y = E + O there and E - O opposite. Both products therefore take
+//! half the multiplications. Unknowns are kept in that order: even bands, then odd ones.
 
 use diaphane_formats::encoding::Encoding;
+use diaphane_formats::sh::{coefficient_count, evaluate};
+use glam::DVec3;
 use ndarray::linalg::general_mat_mul;
-use ndarray::{Array2, ArrayView2, Axis, Slice, Zip};
+use ndarray::{Array2, ArrayView2, ArrayViewMut2, Axis, Slice, Zip};
 
 /// Functions fitted together: their values stay in the cache.
 pub(super) const BATCH: usize = 32;
@@ -21,23 +27,73 @@ const SLOPE_WRONG: f32 = 0.15;
 /// An improvement smaller than this fraction ends a fit.
 const ENOUGH: f32 = 2e-3;
 
+/// Harmonics in the first half of the directions, by parity.
+pub(super) struct Basis {
+    /// Directions × coefficients of even bands.
+    even: Array2<f32>,
+    /// Directions × coefficients of odd bands.
+    odd: Array2<f32>,
+}
+
+impl Basis {
+    /// The basis of `order` bands in `directions`: opposite pairs, all first ones before all second ones.
+    pub fn new(directions: &[DVec3], order: usize) -> Self {
+        let half = directions.len() / 2;
+        let [even, odd] = [0, 1].map(|parity| Array2::zeros((half, places(order, parity).count())));
+        let mut basis = Self { even, odd };
+        let mut row = vec![0.0; coefficient_count(order)];
+        for (k, direction) in directions.iter().take(half).enumerate() {
+            evaluate(order, direction.to_array(), &mut row);
+            for (parity, out) in [&mut basis.even, &mut basis.odd].into_iter().enumerate() {
+                out.row_mut(k).iter_mut().zip(places(order, parity)).for_each(|(o, at)| *o = row[at] as f32);
+            }
+        }
+        basis
+    }
+
+    /// The first `order` bands of it.
+    pub fn bands(&self, order: usize) -> [ArrayView2<'_, f32>; 2] {
+        let columns = |parity| Slice::from(..places(order, parity).count());
+        [self.even.slice_axis(Axis(1), columns(0)), self.odd.slice_axis(Axis(1), columns(1))]
+    }
+}
+
+/// Indices of the coefficients of even (`parity` 0) or odd bands below `order`.
+fn places(order: usize, parity: usize) -> impl Iterator<Item = usize> {
+    (parity..order).step_by(2).flat_map(|l| l * l..(l + 1) * (l + 1))
+}
+
+/// Place of every unknown of `order` bands among the coefficients.
+pub(super) fn coefficient_places(order: usize) -> Vec<usize> {
+    places(order, 0).chain(places(order, 1)).collect()
+}
+
 /// What is fitted: rows are functions, columns directions.
 pub(super) struct Batch<'a> {
-    /// Basis values, directions × coefficients.
-    pub basis: ArrayView2<'a, f32>,
+    /// Basis values of even and of odd bands.
+    pub basis: [ArrayView2<'a, f32>; 2],
     /// One more basis function for each row.
     pub lobe: Option<&'a Array2<f32>>,
 }
 
 impl Batch<'_> {
+    /// Coefficients of each row.
+    fn harmonics(&self) -> usize {
+        self.basis[0].ncols() + self.basis[1].ncols()
+    }
+
     /// Unknowns of each row.
     pub fn unknowns(&self) -> usize {
-        self.basis.ncols() + usize::from(self.lobe.is_some())
+        self.harmonics() + usize::from(self.lobe.is_some())
     }
 
     fn forward(&self, x: &Array2<f32>, y: &mut Array2<f32>) {
-        let n = self.basis.ncols();
-        general_mat_mul(1.0, &x.slice_axis(Axis(1), Slice::from(..n)), &self.basis.t(), 0.0, y);
+        let (even, n) = (self.basis[0].ncols(), self.harmonics());
+        let (mut left, mut right) = y.view_mut().split_at(Axis(1), self.basis[0].nrows());
+        let part = |from: usize, to: usize| x.slice_axis(Axis(1), Slice::from(from..to));
+        general_mat_mul(1.0, &part(0, even), &self.basis[0].t(), 0.0, &mut left);
+        general_mat_mul(1.0, &part(even, n), &self.basis[1].t(), 0.0, &mut right);
+        butterfly(&mut left, &mut right);
         if let Some(lobe) = self.lobe {
             for ((mut y, lobe), x) in y.rows_mut().into_iter().zip(lobe.rows()).zip(x.column(n)) {
                 y.scaled_add(*x, &lobe);
@@ -45,14 +101,21 @@ impl Batch<'_> {
         }
     }
 
-    fn backward(&self, y: &Array2<f32>, x: &mut Array2<f32>) {
-        let n = self.basis.ncols();
-        general_mat_mul(1.0, y, &self.basis, 0.0, &mut x.slice_axis_mut(Axis(1), Slice::from(..n)));
+    /// The products of `y` with all basis functions; `y` is used up.
+    fn backward(&self, y: &mut Array2<f32>, x: &mut Array2<f32>) {
+        let (even, n) = (self.basis[0].ncols(), self.harmonics());
         if let Some(lobe) = self.lobe {
             for ((y, lobe), x) in y.rows().into_iter().zip(lobe.rows()).zip(x.column_mut(n)) {
                 *x = y.dot(&lobe);
             }
         }
+        let (mut left, mut right) = y.view_mut().split_at(Axis(1), self.basis[0].nrows());
+        butterfly(&mut left, &mut right);
+        let mut part = |from: usize, to: usize, y: &ArrayViewMut2<'_, f32>, basis: &ArrayView2<'_, f32>| {
+            general_mat_mul(1.0, y, basis, 0.0, &mut x.slice_axis_mut(Axis(1), Slice::from(from..to)));
+        };
+        part(0, even, &left, &self.basis[0]);
+        part(even, n, &right, &self.basis[1]);
     }
 
     /// Minimises |weight (B x) - right|² + λ mean(weight²) |x|² for every row.
@@ -63,7 +126,7 @@ impl Batch<'_> {
         let mut gradient = Array2::<f32>::zeros(shape);
         let mut curved = Array2::<f32>::zeros(shape);
         let mut values = weight * right;
-        self.backward(&values, &mut gradient);
+        self.backward(&mut values, &mut gradient);
         let mut step = gradient.clone();
         let square = |m: &Array2<f32>, q: usize| m.row(q).dot(&m.row(q));
         let ridge: Vec<f32> =
@@ -73,7 +136,7 @@ impl Batch<'_> {
         for _ in 0..INNER {
             self.forward(&step, &mut values);
             Zip::from(&mut values).and(weight).for_each(|v, w| *v *= w * w);
-            self.backward(&values, &mut curved);
+            self.backward(&mut values, &mut curved);
             for q in 0..rows {
                 curved.row_mut(q).scaled_add(ridge[q], &step.row(q));
                 let curvature = step.row(q).dot(&curved.row(q));
@@ -181,6 +244,11 @@ impl Batch<'_> {
     }
 }
 
+/// Sums and differences of both halves.
+fn butterfly(left: &mut ArrayViewMut2<'_, f32>, right: &mut ArrayViewMut2<'_, f32>) {
+    Zip::from(left).and(right).for_each(|a, b| (*a, *b) = (*a + *b, *a - *b));
+}
+
 /// Squared error of every row.
 fn errors(encoding: Encoding, psi: &Array2<f32>, y: &Array2<f32>) -> Vec<f32> {
     let pairs = |q: usize| psi.row(q).into_iter().copied().zip(y.row(q).into_iter().copied());
@@ -221,23 +289,43 @@ fn decoded(encoding: Encoding, y: f32) -> (f32, f32) {
 mod tests {
     use super::*;
     use diaphane_formats::directions::even_directions;
-    use diaphane_formats::sh::evaluate;
 
-    fn basis(order: usize, count: usize) -> Array2<f32> {
-        let directions = even_directions(count, 5);
-        let mut out = Array2::zeros((count, order * order));
-        let mut row = vec![0.0; order * order];
-        for (d, mut out) in directions.iter().zip(out.rows_mut()) {
-            evaluate(order, d.to_array(), &mut row);
-            out.iter_mut().zip(&row).for_each(|(o, r)| *o = *r as f32);
+    fn directions(count: usize) -> Vec<DVec3> {
+        let pairs = even_directions(count, 5);
+        pairs.iter().step_by(2).chain(pairs.iter().skip(1).step_by(2)).copied().collect()
+    }
+
+    #[test]
+    fn products_by_parity_are_the_plain_ones() {
+        let directions = directions(40);
+        let basis = Basis::new(&directions, 7);
+        for order in [1, 2, 5, 6] {
+            let batch = Batch { basis: basis.bands(order), lobe: None };
+            let x = Array2::from_shape_fn((3, order * order), |(q, k)| ((7 * q + 3 * k) as f32).sin());
+            let mut y = Array2::zeros((3, 40));
+            batch.forward(&x, &mut y);
+            let places = coefficient_places(order);
+            let mut row = vec![0.0; order * order];
+            let mut back = Array2::<f64>::zeros(x.dim());
+            for (d, direction) in directions.iter().enumerate() {
+                evaluate(order, direction.to_array(), &mut row);
+                for q in 0..3 {
+                    let plain: f64 =
+                        places.iter().zip(x.row(q)).map(|(at, x)| row[*at] * f64::from(*x)).sum();
+                    assert!((f64::from(y[[q, d]]) - plain).abs() < 1e-5);
+                    places.iter().enumerate().for_each(|(k, at)| back[[q, k]] += row[*at] * plain);
+                }
+            }
+            let mut x = x;
+            batch.backward(&mut y, &mut x);
+            assert!(x.iter().zip(&back).all(|(a, b)| (f64::from(*a) - b).abs() < 1e-4), "{order}");
         }
-        out
     }
 
     #[test]
     fn functions_within_the_basis_are_found() {
-        let basis = basis(5, 200);
-        let batch = Batch { basis: basis.view(), lobe: None };
+        let basis = Basis::new(&directions(200), 5);
+        let batch = Batch { basis: basis.bands(5), lobe: None };
         for encoding in [Encoding::RECIPROCAL, Encoding::Depth, Encoding::Transmittance] {
             let truth = Array2::from_shape_fn((7, 25), |(q, k)| {
                 let wave = ((q * 31 + k * 17) as f32).sin();
@@ -255,17 +343,17 @@ mod tests {
 
     #[test]
     fn conjugate_gradients_agree_with_the_normal_equations() {
-        let basis = basis(3, 60);
-        let batch = Batch { basis: basis.view(), lobe: None };
+        let basis = Basis::new(&directions(60), 3);
+        let batch = Batch { basis: basis.bands(3), lobe: None };
         let weight = Array2::from_shape_fn((1, 60), |(_, d)| 0.5 + 0.4 * (d as f32).sin());
         let right = Array2::from_shape_fn((1, 60), |(_, d)| (3.0 * d as f32).cos());
         let x = batch.linear(&weight, &right, &[0.0]);
         // The gradient of the least squares vanishes at their minimum.
         let mut values = Array2::zeros((1, 60));
         batch.forward(&x, &mut values);
-        let residual = &weight * &(&weight * &values - &right);
+        let mut residual = &weight * &(&weight * &values - &right);
         let mut gradient = Array2::zeros((1, 9));
-        batch.backward(&residual, &mut gradient);
+        batch.backward(&mut residual, &mut gradient);
         assert!(gradient.iter().all(|g| g.abs() < 1e-3), "{gradient:?}");
     }
 }

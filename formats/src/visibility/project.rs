@@ -25,6 +25,13 @@ pub struct DepthRows {
     pub winding: [Vec<i8>; 2],
 }
 
+impl DepthRows {
+    /// m of each point along ω (side 0) or -ω (side 1).
+    pub fn lengths(&self, side: usize) -> &[f32] {
+        if side == 0 { &self.forward } else { &self.backward }
+    }
+}
+
 /// Points projected along one direction, sorted by grid cell so that a row of cells is contiguous.
 struct Buckets {
     order: Vec<u32>,

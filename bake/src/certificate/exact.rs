@@ -1,0 +1,33 @@
+//! Light that arrives at the samples as it is: means over their cells, no harmonics.
+
+use crate::fit::Lit;
+use crate::field::Shape;
+use crate::progress::Stage;
+use crate::{Prepared, Result};
+use diaphane_formats::visibility::project_with;
+use glam::DVec3;
+use rayon::prelude::*;
+
+/// For each of `lights` (unit vector towards it, channel): the mean of ψβ over every sample's cell.
+pub(super) fn means<const N: usize>(
+    shape: &Shape<'_>,
+    medium: &Prepared<'_>,
+    lit: &Lit,
+    lights: [(DVec3, usize); N],
+    stage: Stage<'_>,
+) -> Result<Vec<Vec<f32>>> {
+    let points = lit.cells.points();
+    lights
+        .par_iter()
+        .map(|(towards, channel)| {
+            let kappa = medium.medium.extinction()[*channel] as f32;
+            let rows = project_with(shape.mesh, medium.medium, medium.for_rays(), points, *towards);
+            let through = |q: usize| rows.boundary[0].get(q).copied().unwrap_or(1.0);
+            let arriving: Vec<f32> =
+                rows.forward.iter().enumerate().map(|(q, m)| (-kappa * m).exp() * through(q)).collect();
+            stage.step(1)?;
+            let size = lit.cells.size;
+            Ok(arriving.chunks_exact(size).map(|cell| cell.iter().sum::<f32>() / size as f32).collect())
+        })
+        .collect()
+}
