@@ -13,8 +13,8 @@ use glam::DVec3;
 pub const MOST_SCALE: f64 = 1e6;
 
 /// Factors on the extinction within which an edited asset was measured to have at most 1.5 times the error of one baked
-/// anew. Below, light that was dark when it was baked and is stored as just that comes through; above, the samples lie
-/// too far apart for light that fades so fast.
+/// anew. Below, the harmonics must tell apart depths that were equally dark when they were fitted (exact depths do
+/// not have this limit); above, the samples lie too far apart for light that fades so fast.
 pub const MEASURED_SCALES: [f64; 2] = [0.5, 2.0];
 
 /// A material relative to the one that was baked. [`Edit::default`] leaves it as it is.
