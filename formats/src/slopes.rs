@@ -17,6 +17,15 @@
 //!   value = v̄ · exp(h·o - ½ s max(0, R²|h|²/5 - (h·o)²))
 //!
 //! with s = 1 for such means and 0 for values that were found at the centroid itself.
+//!
+//! A sample stores the mean of ψ at the reference extinction only; a channel with r = κ/κ̄ takes (mean ψ)^r for the
+//! mean of ψ^r. With σ² the variance of ln ψ over the cell at κ̄ and c the centroid, to second order
+//!
+//!   ln mean(ψ^r) = r ln ψ(c) + ½ r²σ²,   r ln mean(ψ) = r ln ψ(c) + ½ rσ²
+//!
+//! so what exceeds r ln ψ(c) in v̄ is ½ rσ². The channel's own slope is r times that of κ̄ and R²|h|²/5 - (h·o)² is
+//! r²σ²: s = 1/r ([`means_share`]). Below r = 1 the excess is small and the slopes of ψ drown in those of the phase
+//! function and the distance to the light, which 1/r would amplify: s stays 1 there, which measured better.
 
 use crate::asset::Samples;
 use glam::{Mat3, Vec3};
@@ -35,6 +44,11 @@ pub const CELL_RADIUS: f32 = 0.65;
 pub const MOST_RATIO: f32 = 6.0;
 /// |exponent| of a source's variation over its kernel is limited to this.
 pub const MOST_EXPONENT: f32 = 4.0;
+
+/// s of means that are stored at the reference extinction, for channels with `ratio` = κ/κ̄; see the module's head.
+pub fn means_share(ratio: Vec3) -> Vec3 {
+    ratio.max(Vec3::ONE).recip()
+}
 
 /// What a sample scatters towards the camera, per channel.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -90,24 +104,24 @@ impl Stencil {
             .collect();
         Self {
             spokes,
+            limit: limits(samples, &centroid, extinction),
             to_centre: (0..n).map(|i| samples.position(i) - centroid[i]).collect(),
             variance: samples.position_radius.iter().map(|p| (CELL_RADIUS * p[3]).powi(2) / 5.0).collect(),
-            limit: (0..n)
-                .into_par_iter()
-                .map(|i| {
-                    (LIMIT * extinction(centroid[i])).min(STEEPEST / samples.position_radius[i][3]).min(1e30)
-                })
-                .collect(),
             centroid,
         }
     }
 
-    /// Sources from the values at the centroids; `means` is s of the module's head.
-    pub fn sources(&self, values: &[Vec3], means: f32) -> Vec<Source> {
+    /// Limits the slopes for another extinction of the largest channel; `samples` are those of [`Self::new`].
+    pub fn set_extinction(&mut self, samples: &Samples, extinction: impl Fn(Vec3) -> f32 + Sync) {
+        self.limit = limits(samples, &self.centroid, extinction);
+    }
+
+    /// Sources from the values at the centroids; `means` is s of the module's head, per channel.
+    pub fn sources(&self, values: &[Vec3], means: Vec3) -> Vec<Source> {
         (0..values.len()).into_par_iter().with_min_len(256).map(|i| self.source(values, means, i)).collect()
     }
 
-    fn source(&self, values: &[Vec3], means: f32, i: usize) -> Source {
+    fn source(&self, values: &[Vec3], means: Vec3, i: usize) -> Source {
         let own = values[i];
         let mut source = Source::flat(own);
         for c in 0..3 {
@@ -127,10 +141,17 @@ impl Stencil {
             source.slope[c] = h;
             let to_centre = h.dot(self.to_centre[i]);
             let spread = (self.variance[i] * h.length_squared() - to_centre * to_centre).max(0.0);
-            source.value[c] *= (to_centre - 0.5 * means * spread).clamp(-MOST_EXPONENT, MOST_EXPONENT).exp();
+            source.value[c] *=
+                (to_centre - 0.5 * means[c] * spread).clamp(-MOST_EXPONENT, MOST_EXPONENT).exp();
         }
         source
     }
+}
+
+fn limits(samples: &Samples, centroid: &[Vec3], extinction: impl Fn(Vec3) -> f32 + Sync) -> Vec<f32> {
+    let steepest = |i: usize| STEEPEST / samples.position_radius[i][3];
+    let limit = |i: usize| (LIMIT * extinction(centroid[i])).min(steepest(i)).min(1e30);
+    (0..centroid.len()).into_par_iter().map(limit).collect()
 }
 
 fn spokes(centroid: &[Vec3], i: usize, found: &[(f32, u32)]) -> [Spoke; NEIGHBOURS] {
@@ -258,7 +279,7 @@ mod tests {
         let slope = [Vec3::new(2.0, -1.0, 0.5), Vec3::new(0.0, 3.0, 0.0), Vec3::ZERO];
         let values: Vec<Vec3> =
             (0..samples.len()).map(|i| Vec3::from(slope.map(|s| s.dot(samples.position(i)).exp()))).collect();
-        for source in stencil.sources(&values, 0.0) {
+        for source in stencil.sources(&values, Vec3::ZERO) {
             for (got, exact) in source.slope.iter().zip(slope) {
                 // The ridge shortens slopes by a few parts in a thousand.
                 assert!((*got - exact).length() < 0.03 * exact.length() + 1e-4, "{source:?}");
@@ -270,7 +291,7 @@ mod tests {
     fn any_number_of_samples() {
         for count in [0, 1, 2, 5, 30] {
             let stencil = Stencil::new(&samples(count), |_| 1.0);
-            let sources = stencil.sources(&vec![Vec3::new(1.0, 0.0, -1.0); count], 1.0);
+            let sources = stencil.sources(&vec![Vec3::new(1.0, 0.0, -1.0); count], Vec3::ONE);
             assert_eq!(sources.len(), count);
             assert!(Buckets::new(&stencil.centroid).start.len() <= 500 + 8 * count);
             assert!(sources.iter().all(|s| s.value.is_finite() && s.slope.iter().all(|h| h.is_finite())));
@@ -283,6 +304,6 @@ mod tests {
         samples.position_radius.fill([0.5, 0.5, 0.5, 0.1]);
         let stencil = Stencil::new(&samples, |_| 1.0);
         let values: Vec<Vec3> = (0..20).map(|i| Vec3::splat(i as f32)).collect();
-        assert!(stencil.sources(&values, 0.0).iter().flat_map(|s| s.slope).all(|h| h == Vec3::ZERO));
+        assert!(stencil.sources(&values, Vec3::ZERO).iter().flat_map(|s| s.slope).all(|h| h == Vec3::ZERO));
     }
 }

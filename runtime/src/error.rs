@@ -13,6 +13,9 @@ pub enum Error {
     /// No GPU adapter that can draw measured pictures.
     #[error("no usable GPU adapter: {0}; use the CPU backend")]
     NoAdapter(String),
+    /// A change of the material that makes no sense.
+    #[error("{0}")]
+    Edit(String),
     /// The GPU failed while drawing.
     #[error("the GPU failed: {0}")]
     Gpu(String),

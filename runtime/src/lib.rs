@@ -7,6 +7,7 @@
 //! ```
 
 pub mod cpu;
+pub mod edit;
 pub mod exact;
 pub mod frame;
 pub mod framing;

@@ -1,6 +1,7 @@
 //! One renderer, whichever backend draws: what the command line, the window and the validation call.
 
 use crate::cpu::CpuRenderer;
+use crate::edit::Edit;
 use crate::exact::{DepthTracer, ExactDepths};
 use crate::frame::Frame;
 use crate::gpu::GpuRenderer;
@@ -44,6 +45,8 @@ enum Engine {
 pub struct Player {
     engine: Engine,
     note: Option<String>,
+    baked: Info,
+    /// Of the material that is played.
     info: Info,
     tracer: DepthTracer,
     reuse: bool,
@@ -58,7 +61,15 @@ impl Player {
     pub fn new(asset: &Asset, backend: Backend) -> Result<Self> {
         let (engine, note) = open(asset, backend)?;
         let tracer = DepthTracer::new(asset)?;
-        Ok(Self { engine, note, info: asset.info.clone(), tracer, reuse: false, last: None })
+        Ok(Self {
+            engine,
+            note,
+            baked: asset.info.clone(),
+            info: asset.info.clone(),
+            tracer,
+            reuse: false,
+            last: None,
+        })
     }
 
     /// Why the backend is not the one that would have been preferred.
@@ -80,7 +91,23 @@ impl Player {
         self.reuse = reuse;
     }
 
-    /// The asset's parameters.
+    /// Plays another extinction and albedo from the next frame on, relative to those that were baked: edits do not
+    /// add up, and [`Edit::default`] brings the baked material back to the bit. Costs a few bytes to the GPU, or an
+    /// operation a sample on the CPU.
+    ///
+    /// # Errors
+    /// Values out of range; the player then stays as it was.
+    pub fn edit(&mut self, edit: &Edit) -> Result<()> {
+        self.info = edit.apply(&self.baked)?;
+        match &mut self.engine {
+            Engine::Cpu(cpu) => cpu.set_material(&self.info),
+            Engine::Gpu(gpu) => gpu.set_material(&self.info),
+        }
+        self.last = None;
+        Ok(())
+    }
+
+    /// The asset's parameters, extinction and albedo as they are played.
     pub fn info(&self) -> &Info {
         &self.info
     }

@@ -1,7 +1,10 @@
 //! Samples that single precision can draw.
 
-use diaphane_formats::asset::{Asset, Samples};
-use diaphane_formats::slopes::Stencil;
+use diaphane_formats::asset::{Asset, DensityGrid, Info, Samples};
+use glam::{DVec3, Vec3};
+
+/// Extinction in single precision is clamped here; nothing passes through a medium that dense anyway.
+pub const MOST_EXTINCTION: f64 = 1e30;
 
 /// An asset's samples, where those whose place, size or weight would overflow single precision lost their weight and
 /// moved to the centre: no bake makes such samples, but a file can hold them. Order and number are kept.
@@ -19,14 +22,18 @@ pub fn usable_samples(asset: &Asset) -> Samples {
     samples
 }
 
-/// Gradient stencils of an asset's (usable) samples, limited by its largest extinction.
-pub fn slope_stencil(asset: &Asset, samples: &Samples) -> Stencil {
-    let extinction = asset.info.extinction.into_iter().fold(0.0, f64::max) as f32;
-    Stencil::new(samples, |x| {
-        let density = match &asset.density {
-            Some(grid) => grid.value(x)[0],
-            None => asset.info.uniform_density as f32,
-        };
-        (extinction * density).min(1e30)
-    })
+/// ρ at a point; `grid` is the asset's density grid if it has one.
+pub fn density_at<'a>(info: &Info, grid: Option<&'a DensityGrid>) -> impl Fn(Vec3) -> f32 + Sync + 'a {
+    let uniform = info.uniform_density as f32;
+    move |x| grid.map_or(uniform, |g| g.value(x)[0])
+}
+
+/// The largest channel's κt at a point, which limits slopes.
+pub fn largest_extinction<'a>(
+    info: &Info,
+    grid: Option<&'a DensityGrid>,
+) -> impl Fn(Vec3) -> f32 + Sync + 'a {
+    let most = DVec3::from(info.extinction).max_element().min(MOST_EXTINCTION) as f32;
+    let density = density_at(info, grid);
+    move |x| (most * density(x)).min(1e30)
 }

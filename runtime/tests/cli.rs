@@ -63,6 +63,31 @@ fn writes_picture_and_statistics() {
 }
 
 #[test]
+fn plays_another_material() {
+    let folder = folder("edits");
+    let draw = |name: &str, more: &[&str]| {
+        let arguments = ["ball.dph", "--scene", "a.scene.toml", "--backend", "cpu", "--output", name];
+        let done = play(&folder, &[&arguments[..], &["--stats", "s.json"], more].concat());
+        assert!(done.status.success(), "{done:?}");
+        let text = std::fs::read_to_string(folder.join("s.json")).unwrap();
+        let stats: serde_json::Value = serde_json::from_str(&text).unwrap();
+        let pixels = picture::read_exr(&folder.join(name)).unwrap().pixels;
+        (pixels, stats, String::from_utf8_lossy(&done.stderr).into_owned())
+    };
+    let (baked, stats, _) = draw("a.exr", &[]);
+    assert_eq!(stats["extinction"], serde_json::json!([4.0, 4.0, 4.0]));
+    assert_eq!(stats["albedo"], serde_json::json!([0.8, 0.6, 0.4]));
+    let edit = ["--extinction-scale", "0.5,1,2", "--albedo", "0.4"];
+    let (edited, stats, said) = draw("b.exr", &edit);
+    assert_eq!(stats["extinction"], serde_json::json!([2.0, 4.0, 8.0]));
+    assert_eq!(stats["albedo"], serde_json::json!([0.4, 0.4, 0.4]));
+    assert!(baked != edited && !said.contains("warning"), "{said}");
+    // Far from the baked medium: drawn, and said.
+    let (_, _, said) = draw("c.exr", &["--extinction-scale", "100"]);
+    assert!(said.contains("warning: the extinction scale") && said.contains("0.5..2"), "{said}");
+}
+
+#[test]
 fn no_lights_is_black_with_a_warning() {
     let folder = folder("dark");
     let dark = SCENE.split("[[lights]]").next().unwrap();
@@ -85,7 +110,7 @@ fn refuses_bad_input_in_one_line() {
     let bytes = std::fs::read(folder.join("ball.dph")).unwrap();
     std::fs::write(folder.join("cut.dph"), &bytes[..bytes.len() / 2]).unwrap();
     std::fs::write(folder.join("input.exr"), &bytes).unwrap();
-    let cases: [(&[&str], &str); 10] = [
+    let cases: [(&[&str], &str); 13] = [
         (&["missing.dph", "--output", "o.png"], "missing.dph"),
         (&["cut.dph", "--output", "o.png"], "cut.dph"),
         (&["a.scene.toml", "--output", "o.png"], "a.scene.toml"),
@@ -95,6 +120,9 @@ fn refuses_bad_input_in_one_line() {
         (&["ball.dph", "--scene", "scene.png", "--output", "scene.png"], "both input and output"),
         (&["ball.dph", "--scene", "zero.toml", "--output", "o.png"], "image.width"),
         (&["ball.dph", "--scene", "misspelt.toml", "--output", "o.png"], "'width'"),
+        (&["ball.dph", "--output", "o.png", "--extinction-scale", "-1"], "extinction scale must lie"),
+        (&["ball.dph", "--output", "o.png", "--albedo", "0.5,2,0"], "albedo must lie within 0..1"),
+        (&["ball.dph", "--output", "o.png", "--albedo", "0.5,red,0"], "'red' is not a number"),
         (&["ball.dph", "--scene", "on_target.toml", "--output", "o.png"], "same point"),
     ];
     for (arguments, expected) in cases {

@@ -4,6 +4,7 @@ use diaphane_formats::asset::Asset;
 use diaphane_formats::picture::Picture;
 use diaphane_formats::scene::Scene;
 use diaphane_runtime::Result;
+use diaphane_runtime::edit::Edit;
 use diaphane_runtime::frame::Frame;
 use diaphane_runtime::player::{Backend, LightMode, Player};
 use std::time::Instant;
@@ -36,6 +37,21 @@ pub fn play(
     light: LightMode,
     frames: usize,
 ) -> Result<Played> {
+    play_edited(asset, &Edit::default(), scene, backend, light, frames)
+}
+
+/// As [`play`], with another material.
+///
+/// # Errors
+/// As [`play`]; an edit that is out of range.
+pub fn play_edited(
+    asset: &Asset,
+    edit: &Edit,
+    scene: &Scene,
+    backend: Backend,
+    light: LightMode,
+    frames: usize,
+) -> Result<Played> {
     let mut scene = scene.clone();
     let mut warnings = Vec::new();
     if scene.surface.reflection {
@@ -51,6 +67,8 @@ pub fn play(
     }
     let mut player = Player::new(asset, backend)?;
     warnings.extend(player.note().map(str::to_owned));
+    player.edit(edit)?;
+    warnings.extend(edit.warning());
     let (backend, adapter) = player.describe();
     let (backend, adapter) = (backend.to_owned(), adapter);
     let mut times = Vec::new();

@@ -29,6 +29,14 @@ fn parameters() {
         let image = ["ball.dph", "ball.obj", "--material", "m.toml", "--scene", "s.toml", "--max-error=-1"];
         bench.refuses("validate", &image.with("image"), "--max-error");
     }
+    for (option, value, says) in [
+        ("--extinction-scale", "nan", "extinction scale must lie"),
+        ("--extinction-scale", "1,2", "one number or three"),
+        ("--albedo", "1.5", "albedo must lie within 0..1"),
+    ] {
+        let image = ["ball.dph", "ball.obj", "--material", "m.toml", "--scene", "s.toml", option, value];
+        bench.refuses("validate", &image.with("image"), says);
+    }
     bench.refuses("validate", &["refrence"], "refrence");
     bench.refuses("validate", &[], "--help");
     bench.refuses(

@@ -123,6 +123,31 @@ fn image_writes_pictures_map_and_report_and_judges() {
 }
 
 #[test]
+fn image_edits_player_and_reference_alike() {
+    let bench = Workbench::new();
+    let inputs = [&["image", "ball.dph"], &INPUTS[..], &["--tolerance", "0.02", "--backend", "cpu"]].concat();
+    let edit = ["--extinction-scale", "2,1,1", "--albedo", "0.4,0.7,0.6", "--output-dir", "e"];
+    let error = |arguments: &[&str], folder: &str| -> f64 {
+        let done = validate(&bench, arguments);
+        assert!(done.status.success(), "{done:?}");
+        let bytes = std::fs::read(bench.path(folder).join("report.json")).unwrap();
+        serde_json::from_slice::<serde_json::Value>(&bytes).unwrap()[0]["metrics"]["rel_rmse"]
+            .as_f64()
+            .unwrap()
+    };
+    // Half the albedo on one side alone would make red, the brightest channel, twice as bright there: an error of
+    // 0.5 or 1 in half of the radiance. So few samples are off by 0.07 by themselves.
+    let edited = error(&[&inputs[..], &edit[..]].concat(), "e");
+    assert!(edited < 0.15, "{edited}");
+    // The same reference from a material file that says so: [3, 2, 1] · [2, 1, 1], to the bit.
+    bench.write("m.toml", "extinction = [6, 2, 1]\nalbedo = [0.4, 0.7, 0.6]\n");
+    let arguments = [&["reference"], &INPUTS[..], &["--output", "r.exr", "--tolerance", "0.02"]].concat();
+    assert!(validate(&bench, &arguments).status.success());
+    let pixels = |name: &str| read_exr(&bench.path(name)).unwrap().pixels;
+    assert!(pixels("r.exr") == pixels("e/reference.exr"));
+}
+
+#[test]
 fn demo_tells_the_whole_story() {
     let bench = Workbench::new();
     let done = validate(&bench, &["demo", "--output-dir", "o", "--samples", "1500", "--backend", "cpu"]);

@@ -8,7 +8,7 @@ use diaphane_formats::harmonics::Coefficients;
 use diaphane_formats::hits::{Hit, Hits};
 use diaphane_formats::reconstruct::{Along, Cloud, Profile};
 use diaphane_formats::sh;
-use diaphane_formats::slopes::{Source, Stencil};
+use diaphane_formats::slopes::{Source, Stencil, means_share};
 use glam::{DVec3, Vec3};
 use half::f16;
 use rayon::prelude::*;
@@ -103,7 +103,7 @@ impl<'a> Player<'a> {
             };
             let values: Vec<Vec3> =
                 (0..self.asset.samples.len()).into_par_iter().with_min_len(256).map(value).collect();
-            let sources = self.stencil.sources(&values, 1.0);
+            let sources = self.stencil.sources(&values, means_share(self.asset.info.ratio()));
             let radiance: Vec<Vec3> = self
                 .rays
                 .par_iter()

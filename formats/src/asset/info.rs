@@ -6,6 +6,7 @@ use crate::mesh::MeshReport;
 use crate::phase::Phase;
 use crate::sh::MAX_ORDER;
 use crate::{Error, Result};
+use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
 /// Where an asset comes from: enough to bake it again.
@@ -69,7 +70,13 @@ pub struct Info {
 impl Info {
     /// Length of the bounding box's diagonal.
     pub fn diagonal(&self) -> f32 {
-        glam::Vec3::from(self.bounds[1]).distance(glam::Vec3::from(self.bounds[0]))
+        Vec3::from(self.bounds[1]).distance(Vec3::from(self.bounds[0]))
+    }
+
+    /// κ/κ̄ per channel: what stored optical depths are multiplied with. 0 where κ̄ is 0.
+    pub fn ratio(&self) -> Vec3 {
+        let reference = self.reference_extinction;
+        if reference > 0.0 { (DVec3::from(self.extinction) / reference).as_vec3() } else { Vec3::ZERO }
     }
 
     pub(super) fn validate(&self) -> Result<()> {

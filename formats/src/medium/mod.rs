@@ -53,6 +53,14 @@ impl Medium {
         Ok(Self { extinction, albedo, phase, ior, density })
     }
 
+    /// The same medium with another extinction (1 / mesh unit) and albedo (0..1).
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn with_material(self, extinction: DVec3, albedo: DVec3) -> Result<Self> {
+        Self::new(extinction, albedo, self.phase, self.ior, self.density)
+    }
+
     /// Extinction at density 1, per channel, 1 / mesh unit.
     pub fn extinction(&self) -> DVec3 {
         self.extinction

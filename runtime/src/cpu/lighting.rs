@@ -13,7 +13,7 @@
 
 use crate::exact::ExactDepths;
 use crate::frame::{Frame, FrameLight, LightKind};
-use diaphane_formats::asset::{Asset, Samples};
+use diaphane_formats::asset::{Asset, Info, Samples};
 use diaphane_formats::encoding::Encoding;
 use diaphane_formats::harmonics::Coefficients;
 use diaphane_formats::sh::{self, MAX_ORDER, coefficient_count};
@@ -51,19 +51,26 @@ impl Lighting {
     /// Parameters of an asset.
     pub fn new(asset: &Asset) -> Self {
         let info = &asset.info;
-        let extinction = DVec3::from(info.extinction);
-        let reference = info.reference_extinction;
-        Self {
-            extinction: extinction.as_vec3(),
-            ratio: (reference > 0.0).then(|| (extinction / reference).as_vec3()),
-            albedo: DVec3::from(info.albedo).as_vec3(),
+        let mut lighting = Self {
+            extinction: Vec3::ZERO,
+            ratio: None,
+            albedo: Vec3::ZERO,
             g: info.phase.mean_cosine() as f32,
             encoding: info.encoding,
             order: info.order.max(info.boundary_order) as usize,
             depth: asset.samples.depth.decoded(),
             lobe: asset.samples.lobe.iter().map(|a| Vec3::from(a.map(|v| v.to_f32()))).collect(),
             boundary: asset.samples.boundary.decoded(),
-        }
+        };
+        lighting.set_material(info);
+        lighting
+    }
+
+    /// Takes extinction and albedo from an edited asset's parameters.
+    pub fn set_material(&mut self, info: &Info) {
+        self.extinction = DVec3::from(info.extinction).as_vec3();
+        self.ratio = (info.reference_extinction > 0.0).then(|| info.ratio());
+        self.albedo = DVec3::from(info.albedo).as_vec3();
     }
 
     /// v of every sample at its centroid, in the samples' order; parallel over samples.

@@ -11,22 +11,19 @@ use crate::Result;
 use crate::exact::ExactDepths;
 use crate::frame::Frame;
 use crate::rendered::{Counters, RayResult, Rendered};
-use crate::usable::{slope_stencil, usable_samples};
+use crate::usable::{MOST_EXTINCTION, largest_extinction, usable_samples};
 use block::{Block, Shared};
-use diaphane_formats::asset::{Asset, DensityGrid, Samples};
+use diaphane_formats::asset::{Asset, DensityGrid, Info, Samples};
 use diaphane_formats::directions::subpixel_offsets;
 use diaphane_formats::picture::Picture;
 use diaphane_formats::reconstruct::Cloud;
-use diaphane_formats::slopes::{Source, Stencil};
+use diaphane_formats::slopes::{Source, Stencil, means_share};
 use diaphane_formats::visibility::Accel;
 use glam::{DVec3, Vec3};
 use lighting::Lighting;
 use rayon::prelude::*;
 use std::time::Instant;
 use tiles::{BLOCK, Rect};
-
-/// Extinction in single precision is clamped here; nothing passes through a medium that dense anyway.
-const MOST_EXTINCTION: f64 = 1e30;
 
 /// Draws frames of one asset on the CPU.
 pub struct CpuRenderer {
@@ -37,6 +34,8 @@ pub struct CpuRenderer {
     accel: Accel,
     density: Option<DensityGrid>,
     extinction: Vec3,
+    /// s of [`diaphane_formats::slopes`] for baked light.
+    means: Vec3,
     ior: f64,
     corners: Vec<[Vec3; 3]>,
     normals: Vec<[Vec3; 3]>,
@@ -51,17 +50,17 @@ impl CpuRenderer {
     pub fn new(asset: &Asset) -> Result<Self> {
         asset.validate()?;
         let mesh = asset.mesh()?;
-        let medium = asset.medium()?;
+        asset.medium()?;
         let samples = usable_samples(asset);
-        let extinction = medium.extinction() * medium.uniform_density();
         Ok(Self {
             lighting: Lighting::new(asset),
             cloud: Cloud::new(&samples, asset.info.width_factor),
-            stencil: slope_stencil(asset, &samples),
+            stencil: Stencil::new(&samples, largest_extinction(&asset.info, asset.density.as_ref())),
             accel: Accel::new(&mesh),
             density: asset.density.clone(),
-            extinction: extinction.min(DVec3::splat(MOST_EXTINCTION)).as_vec3(),
-            ior: medium.ior(),
+            extinction: extinction_along(&asset.info, asset.density.is_some()),
+            means: means_share(asset.info.ratio()),
+            ior: asset.info.ior,
             corners: (0..mesh.triangles.len()).map(|i| mesh.corners(i).map(|p| p.as_vec3())).collect(),
             normals: surface::corner_normals(&mesh),
             samples_drawn: samples.weight.iter().filter(|w| **w > 0.0).count() as u64,
@@ -69,10 +68,18 @@ impl CpuRenderer {
         })
     }
 
+    /// Takes extinction and albedo from an edited asset's parameters; the rest of them must be the asset's own.
+    pub fn set_material(&mut self, info: &Info) {
+        self.lighting.set_material(info);
+        self.stencil.set_extinction(&self.samples, largest_extinction(info, self.density.as_ref()));
+        self.extinction = extinction_along(info, self.density.is_some());
+        self.means = means_share(info.ratio());
+    }
+
     /// The source of every sample under the frame's lights, see [`lighting`].
     pub fn sources(&self, frame: &Frame, exact: Option<&ExactDepths>) -> Vec<Source> {
         let values = self.lighting.values(&self.samples, frame, exact);
-        self.stencil.sources(&values, frame.share_of_means(exact))
+        self.stencil.sources(&values, self.means * frame.share_of_means(exact))
     }
 
     /// Draws a frame.
@@ -134,6 +141,12 @@ impl CpuRenderer {
         let triangle = triangle as usize;
         surface::Entry::new(frame.view.origin + direction * t, self.corners[triangle], self.normals[triangle])
     }
+}
+
+/// κ along camera rays, per channel: at density 1 where there is a grid.
+fn extinction_along(info: &Info, grid: bool) -> Vec3 {
+    let density = if grid { 1.0 } else { info.uniform_density };
+    (DVec3::from(info.extinction) * density).min(DVec3::splat(MOST_EXTINCTION)).as_vec3()
 }
 
 /// Calls `put` with the index in a picture of `width` columns and the value of every pixel of a block.

@@ -10,7 +10,7 @@ use crate::exact::ExactDepths;
 use crate::frame::Frame;
 use crate::rendered::{Counters, MAX_PIECES, RayResult, Rendered};
 use crate::{Error, Result};
-use diaphane_formats::asset::Asset;
+use diaphane_formats::asset::{Asset, Info};
 use diaphane_formats::directions::subpixel_offsets;
 use diaphane_formats::picture::Picture;
 use std::time::Instant;
@@ -53,6 +53,11 @@ impl GpuRenderer {
     /// Tiles that the last picture was drawn in; more than one where it was too large for the adapter's buffers.
     pub fn tiles(&self) -> usize {
         self.tiles
+    }
+
+    /// Takes extinction and albedo from an edited asset's parameters; the rest of them must be the asset's own.
+    pub fn set_material(&mut self, info: &Info) {
+        self.renderer.set_material(&self.owned.device, &self.owned.queue, info);
     }
 
     /// Draws a frame. Times of passes come from the adapter's clock; one that has none gives the single entry

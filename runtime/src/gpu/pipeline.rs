@@ -18,7 +18,7 @@ use crate::Result;
 use crate::exact::ExactDepths;
 use crate::frame::Frame;
 use crate::rendered::MAX_PIECES;
-use diaphane_formats::asset::Asset;
+use diaphane_formats::asset::{Asset, Info};
 use wgpu::{BindGroup, BindGroupLayout, CommandEncoder, Device, Queue};
 
 /// The passes, their buffers and their order.
@@ -78,6 +78,12 @@ impl Pipeline {
             targets: None,
             most_memory: TOTAL,
         })
+    }
+
+    /// Takes extinction and albedo from an edited asset's parameters.
+    pub(super) fn set_material(&mut self, device: &Device, queue: &Queue, info: &Info) {
+        self.asset.set_material(queue, info);
+        self.splat.set_grey(device, self.asset.material.is_grey());
     }
 
     /// Uploads a frame's lights, and sees that there are targets for its tiles, which it returns.

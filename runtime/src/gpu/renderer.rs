@@ -12,7 +12,7 @@ use crate::exact::ExactDepths;
 use crate::frame::Frame;
 use crate::rendered::Counters;
 use crate::{Error, Result};
-use diaphane_formats::asset::Asset;
+use diaphane_formats::asset::{Asset, Info};
 use diaphane_formats::directions::subpixel_offsets;
 use diaphane_formats::picture::Picture;
 use std::ops::Range;
@@ -95,6 +95,12 @@ impl Renderer {
             tiles: 0,
             passes,
         })
+    }
+
+    /// Takes extinction and albedo from an edited asset's parameters (see [`crate::edit`]); the rest of them must be
+    /// the asset's own. The next picture must begin with its first ray.
+    pub fn set_material(&mut self, device: &Device, queue: &Queue, info: &Info) {
+        self.passes.set_material(device, queue, info);
     }
 
     /// Records rays of a picture. [`Self::render`] then shows the mean of all rays so far.

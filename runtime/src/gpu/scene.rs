@@ -7,16 +7,18 @@ use super::uniforms::{LightRecord, MediumUniform, ViewUniform};
 use crate::cpu::surface::corner_normals;
 use crate::exact::ExactDepths;
 use crate::frame::Frame;
-use crate::usable::{slope_stencil, usable_samples};
+use crate::usable::{density_at, usable_samples};
 use crate::{Error, Result};
-use diaphane_formats::asset::Asset;
-use diaphane_formats::slopes::NEIGHBOURS;
+use diaphane_formats::asset::{Asset, Info};
+use diaphane_formats::slopes::{NEIGHBOURS, Stencil};
 use diaphane_formats::{kernel, sh};
 use wgpu::{BindGroup, BindGroupLayout, Buffer, BufferBinding, BufferUsages, Device, Queue, ShaderStages};
 
 /// Everything that stays as long as the asset does.
 pub(super) struct AssetBuffers {
     pub medium: Buffer,
+    /// What [`Self::medium`] holds.
+    pub material: MediumUniform,
     pub positions: Buffer,
     pub triangles: Buffer,
     pub neighbours: Buffer,
@@ -31,7 +33,7 @@ pub(super) struct AssetBuffers {
     /// Where each sample's codes are, and its scales.
     pub packed: Buffer,
     pub grid: Buffer,
-    /// Where values hold, and the largest slope.
+    /// Where values hold, and the density there.
     pub centroids: Buffer,
     /// Gradient stencils.
     pub spokes: Buffer,
@@ -46,7 +48,6 @@ pub(super) struct AssetBuffers {
     pub fresnel: bool,
     pub boundary_order: usize,
     pub heterogeneous: bool,
-    pub grey: bool,
 }
 
 impl AssetBuffers {
@@ -63,13 +64,11 @@ impl AssetBuffers {
             .iter()
             .map(|&[x, y, z, radius]| [x, y, z, kernel::sharpness(radius, info.width_factor)])
             .collect();
-        let stencil = slope_stencil(asset, &samples);
-        let centroids: Vec<[f32; 4]> = stencil
-            .centroid
-            .iter()
-            .zip(&stencil.limit)
-            .map(|(c, limit)| c.extend(*limit).to_array())
-            .collect();
+        let density = density_at(info, asset.density.as_ref());
+        // The shader limits the slopes itself, for whatever extinction is played.
+        let stencil = Stencil::new(&samples, |_| 0.0);
+        let centroids: Vec<[f32; 4]> =
+            stencil.centroid.iter().map(|c| c.extend(density(*c)).to_array()).collect();
         let spokes: Vec<[f32; 4]> = stencil
             .spokes
             .as_flattened()
@@ -79,7 +78,7 @@ impl AssetBuffers {
         let normals = if fresnel { corner_normals(&asset.mesh()?) } else { Vec::new() };
         let recurrence: Vec<[f32; 4]> = sh::shader_table().iter().map(|&[a, b]| [a, b, 0.0, 0.0]).collect();
         let grid = asset.density.as_ref().map_or(&[][..], |g| &g.values);
-        let medium = MediumUniform::new(asset);
+        let material = MediumUniform::new(asset);
         let limits = device.limits();
         let most = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
         let largest = [
@@ -125,13 +124,22 @@ impl AssetBuffers {
             fresnel,
             boundary_order: info.boundary_order as usize,
             heterogeneous: asset.density.is_some(),
-            grey: medium.is_grey(),
-            medium: filled_buffer(device, "medium", &[medium], BufferUsages::UNIFORM),
+            medium: filled_buffer(
+                device,
+                "medium",
+                &[material],
+                BufferUsages::UNIFORM | BufferUsages::COPY_DST,
+            ),
+            material,
         })
     }
-}
 
-impl AssetBuffers {
+    /// Takes extinction and albedo from an edited asset's parameters: a few bytes to upload.
+    pub fn set_material(&mut self, queue: &Queue, info: &Info) {
+        self.material.set_material(info, self.heterogeneous);
+        queue.write_buffer(&self.medium, 0, bytemuck::bytes_of(&self.material));
+    }
+
     /// Columns and rows of workgroups with 64 threads that give each sample one.
     pub fn sample_groups(&self) -> [u32; 2] {
         const ROW: u32 = 1024;

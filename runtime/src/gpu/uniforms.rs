@@ -2,17 +2,15 @@
 //! the scalar after it fills its last four bytes. The tests check sizes and places against the shaders' source.
 
 use crate::frame::{Frame, FrameLight};
+use crate::usable::MOST_EXTINCTION;
 use bytemuck::{Pod, Zeroable};
-use diaphane_formats::asset::Asset;
+use diaphane_formats::asset::{Asset, Info};
 use diaphane_formats::encoding::Encoding;
 use diaphane_formats::kernel;
-use diaphane_formats::slopes::CELL_RADIUS;
+use diaphane_formats::slopes::{CELL_RADIUS, STEEPEST, means_share};
 use glam::{DVec3, Vec3};
 
 use super::tiles::Tile;
-
-/// Extinction in single precision is clamped here, as on the CPU.
-const MOST_EXTINCTION: f64 = 1e30;
 
 /// Surface nearer to the camera than this fraction of the diagonal is not seen.
 const NEAR: f32 = 1e-5;
@@ -88,30 +86,28 @@ pub(super) struct MediumUniform {
     pub ior: f32,
     pub grid_size: [u32; 3],
     pub triangles: u32,
+    pub means: Vec3,
+    pub most_extinction: f32,
+    pub steepest: f32,
+    pub unused: [u32; 3],
 }
 
 impl MediumUniform {
     /// An asset's medium.
     pub fn new(asset: &Asset) -> Self {
         let info = &asset.info;
-        let extinction = DVec3::from(info.extinction);
-        let along = if asset.density.is_some() { extinction } else { extinction * info.uniform_density };
-        let reference = info.reference_extinction;
         let (encoding, epsilon) = match info.encoding {
             Encoding::Transmittance => (0, 0.0),
             Encoding::Reciprocal { epsilon } | Encoding::Lobe { epsilon } => (1, epsilon),
             Encoding::Depth => (2, 0.0),
         };
         let grid = asset.density.as_ref();
-        Self {
-            kappa: along.min(DVec3::splat(MOST_EXTINCTION)).as_vec3(),
-            // A kernel with disk radius 1 has sharpness a: R²/5 in units of 1/a².
-            cell_variance: (CELL_RADIUS * kernel::sharpness(1.0, info.width_factor)).powi(2) / 5.0,
-            extinction: extinction.as_vec3(),
+        // Of a kernel with disk radius 1.
+        let sharpness = kernel::sharpness(1.0, info.width_factor);
+        let mut medium = Self {
+            cell_variance: (CELL_RADIUS * sharpness).powi(2) / 5.0,
             samples: asset.samples.len() as u32,
-            ratio: if reference > 0.0 { (extinction / reference).as_vec3() } else { Vec3::ZERO },
             encoding,
-            albedo: DVec3::from(info.albedo).as_vec3(),
             epsilon,
             grid_min: grid.map_or(Vec3::ZERO, |g| g.min.into()),
             mean_cosine: info.phase.mean_cosine() as f32,
@@ -119,7 +115,23 @@ impl MediumUniform {
             ior: info.ior as f32,
             grid_size: grid.map_or([1; 3], |g| g.size),
             triangles: asset.mesh_triangles.len() as u32,
-        }
+            steepest: STEEPEST / sharpness,
+            ..Self::zeroed()
+        };
+        medium.set_material(info, grid.is_some());
+        medium
+    }
+
+    /// Takes extinction and albedo from an edited asset's parameters; `grid` says whether it has a density grid.
+    pub fn set_material(&mut self, info: &Info, grid: bool) {
+        let extinction = DVec3::from(info.extinction);
+        let along = if grid { extinction } else { extinction * info.uniform_density };
+        self.kappa = along.min(DVec3::splat(MOST_EXTINCTION)).as_vec3();
+        self.extinction = extinction.as_vec3();
+        self.ratio = info.ratio();
+        self.albedo = DVec3::from(info.albedo).as_vec3();
+        self.means = means_share(info.ratio());
+        self.most_extinction = extinction.max_element().min(MOST_EXTINCTION) as f32;
     }
 
     /// Whether all channels attenuate alike.
@@ -237,7 +249,10 @@ mod tests {
             grid_max,
             ior,
             grid_size,
-            triangles
+            triangles,
+            means,
+            most_extinction,
+            steepest
         );
         mirrors!(
             LightRecord,

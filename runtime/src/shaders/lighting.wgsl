@@ -2,7 +2,7 @@
 //
 //   v = albedo * sum over lights of p(cos) E psi boundary,   psi = exp(-ratio * decode(SH)) or exp(-extinction * m)
 
-@group(1) @binding(0) var<storage, read> centroids: array<vec4f>;   // where values hold, largest slope
+@group(1) @binding(0) var<storage, read> centroids: array<vec4f>;   // where values hold, density there
 @group(1) @binding(1) var<storage, read> weights: array<f32>;
 @group(1) @binding(2) var<storage, read> depth: array<u32>;         // codes of the depth's harmonics
 @group(1) @binding(3) var<storage, read> boundary: array<u32>;      // the same of the boundary; only where ior is not 1

@@ -2,7 +2,7 @@
 // which states the formulas.
 
 @group(1) @binding(0) var<storage, read> samples: array<vec4f>;   // position, sharpness
-@group(1) @binding(1) var<storage, read> centroids: array<vec4f>; // where values hold, largest slope
+@group(1) @binding(1) var<storage, read> centroids: array<vec4f>; // where values hold, density there
 @group(1) @binding(2) var<storage, read> spokes: array<vec4f>;    // NEIGHBOURS a sample: gradient, index (bits)
 @group(1) @binding(3) var<storage, read> values: array<vec4f>;    // v at the centroid, weight
 // SOURCE a sample: v at the kernel's centre and weight, then the slope of each channel.
@@ -10,6 +10,7 @@
 
 const NEIGHBOURS: u32 = 14u;
 const SOURCE: u32 = 4u;
+const LIMIT: f32 = 6.0;
 const MOST_RATIO: f32 = 6.0;
 const MOST_EXPONENT: f32 = 4.0;
 
@@ -24,6 +25,8 @@ fn find_slopes(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups
     let kernel = samples[sample];
     let to_centre = kernel.xyz - centroid.xyz;
     let variance = medium.cell_variance / (kernel.w * kernel.w);
+    let means = view.means * medium.means;
+    let limit = min(LIMIT * min(medium.most_extinction * centroid.w, 1e30), medium.steepest * kernel.w);
     var value = own.xyz;
     for (var c = 0u; c < 3u; c++) {
         var slope = vec3f(0.0);
@@ -38,12 +41,12 @@ fn find_slopes(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups
                 slope += spoke.xyz * logarithm;
             }
             let size = length(slope);
-            if (size > centroid.w) {
-                slope *= centroid.w / size;
+            if (size > limit) {
+                slope *= limit / size;
             }
             let along = dot(slope, to_centre);
             let spread = max(variance * dot(slope, slope) - along * along, 0.0);
-            value[c] *= exp(clamp(along - 0.5 * view.means * spread, -MOST_EXPONENT, MOST_EXPONENT));
+            value[c] *= exp(clamp(along - 0.5 * means[c] * spread, -MOST_EXPONENT, MOST_EXPONENT));
         }
         sources[SOURCE * sample + 1u + c] = vec4f(slope, 0.0);
     }

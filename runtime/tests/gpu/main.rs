@@ -1,6 +1,7 @@
 //! The GPU against its CPU twin, on synthetic assets. Without an adapter the tests say "skipped" and pass, unless
 //! DIAPHANE_REQUIRE_GPU=1 asks them to fail.
 
+mod edits;
 mod objects;
 mod scenes;
 

@@ -8,11 +8,12 @@ use clap::ValueEnum;
 use diaphane_formats::asset::{self, Asset};
 use diaphane_formats::files;
 use diaphane_formats::mesh::Mesh;
+use diaphane_runtime::edit::{Edit, parse_channels};
 use diaphane_runtime::player::{Backend, LightMode};
 use glam::{DVec3, Vec3};
 use std::path::PathBuf;
 use validation::metrics::compare;
-use validation::play::play;
+use validation::play::play_edited;
 use validation::reference::{Settings, render};
 use validation::report::{Case, PICTURES, write_pictures, write_report};
 
@@ -21,7 +22,9 @@ use validation::report::{Case, PICTURES, write_pictures, write_report};
 #[command(
     after_help = "Writes played.exr, played.png, reference.exr, reference.png, error.png, report.html and \
                         report.json.\n\nExample:\n  diaphane-validate image bunny.dph bunny.obj --material \
-                        jade.material.toml \\\n      --scene studio.scene.toml --output-dir check --max-error 0.15"
+                        jade.material.toml \\\n      --scene studio.scene.toml --output-dir check --max-error 0.15\n  \
+                        diaphane-validate image bunny.dph bunny.obj --material jade.material.toml \\\n      \
+                        --scene studio.scene.toml --extinction-scale 2 --albedo 0.9,0.8,0.6"
 )]
 pub struct Arguments {
     /// Baked asset
@@ -41,6 +44,13 @@ pub struct Arguments {
     /// Where the depth towards lights comes from
     #[arg(long, value_enum, default_value_t = LightName::Baked)]
     light: LightName,
+    /// Play with the baked extinction times S, one factor or one for each channel; the reference renders the material
+    /// file's extinction times S
+    #[arg(long, value_name = "S|R,G,B", value_parser = parse_channels, allow_hyphen_values = true)]
+    extinction_scale: Option<DVec3>,
+    /// Single-scattering albedo (0..1) of player and reference instead of the asset's and the material file's
+    #[arg(long, value_name = "A|R,G,B", value_parser = parse_channels, allow_hyphen_values = true)]
+    albedo: Option<DVec3>,
     /// Relative noise of the reference at which to stop
     #[arg(long, default_value_t = 0.005)]
     tolerance: f64,
@@ -101,15 +111,18 @@ pub fn run(a: &Arguments) -> anyhow::Result<bool> {
         "--tolerance must be above 0, not {}",
         a.tolerance
     );
+    let edit = Edit { extinction_scale: a.extinction_scale.unwrap_or(DVec3::ONE), albedo: a.albedo };
+    edit.validate()?;
     let asset = asset::read(&a.asset)?;
-    let loaded = a.inputs.load()?;
+    let mut loaded = a.inputs.load()?;
+    loaded.medium = edit.medium(loaded.medium)?;
     for name in PICTURES.into_iter().chain(["report.html", "report.json"]) {
         let output = a.output_dir.join(name);
         a.inputs.require_different(&output)?;
         files::require_different(&output, &a.asset)?;
     }
     check_folder(&a.output_dir)?;
-    let mut played = play(&asset, &loaded.scene, a.backend.into(), a.light.into(), 1)?;
+    let mut played = play_edited(&asset, &edit, &loaded.scene, a.backend.into(), a.light.into(), 1)?;
     make_folder(&a.output_dir)?;
     played.warnings.extend(loaded.warnings);
     if !same_object(&asset, &loaded.mesh) {
@@ -125,13 +138,15 @@ pub fn run(a: &Arguments) -> anyhow::Result<bool> {
     display.finish();
     let coverage = reference.picture.coverage.clone().unwrap_or_default();
     let metrics = compare(&played.picture, &reference.picture, &coverage)?;
-    let info = &asset.info;
+    let info = edit.apply(&asset.info)?;
     let facts = [
         ("mesh", info.provenance.mesh_name.clone()),
         ("material", info.provenance.material_name.clone()),
         ("samples", info.samples.to_string()),
         ("directions", info.provenance.directions.to_string()),
         ("harmonic bands", info.order.to_string()),
+        ("extinction", channels(info.extinction)),
+        ("albedo", channels(info.albedo)),
         ("lights", loaded.scene.lights.len().to_string()),
     ];
     let case = Case {
@@ -159,6 +174,11 @@ pub fn run(a: &Arguments) -> anyhow::Result<bool> {
         tell(&format!("check failed: {} values are not finite", metrics.non_finite));
     }
     Ok(good && metrics.non_finite == 0)
+}
+
+/// Three numbers for people.
+fn channels(rgb: [f64; 3]) -> String {
+    rgb.map(|v| format!("{v:.4}")).join(", ")
 }
 
 /// Whether the bounding boxes agree to a thousandth of the diagonal.

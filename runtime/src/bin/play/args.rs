@@ -1,7 +1,9 @@
 //! The command line.
 
 use clap::{Parser, ValueEnum};
+use diaphane_runtime::edit::{Edit, parse_channels};
 use diaphane_runtime::player::{Backend, LightMode};
+use glam::DVec3;
 use std::path::PathBuf;
 
 const EXAMPLES: &str = "\
@@ -15,7 +17,9 @@ Examples:
   diaphane-play statue.dph --scene side.scene.toml --output side.exr --frames 20 --stats side.json
       draws the frame 20 times, every pass anew, and writes timings
   diaphane-play lamp.dph --scene inside.scene.toml --output inside.exr --light auto
-      traces rays to lights that stand inside the object";
+      traces rays to lights that stand inside the object
+  diaphane-play statue.dph --extinction-scale 0.5 --albedo 0.9,0.8,0.6 --output amber.png
+      half as dense as baked, and another colour: no new bake is needed";
 
 /// Plays a baked translucent asset in a window, or draws one picture of it.
 #[derive(Debug, Parser)]
@@ -37,6 +41,13 @@ pub struct Args {
     /// inside the object's bounding box). Headless default: baked; in the window: auto
     #[arg(long, value_enum)]
     pub light: Option<LightArg>,
+    /// Play with the baked extinction times S, one factor for all channels or one for each (0.5..2 is nearly as
+    /// good as a new bake)
+    #[arg(long, value_name = "S|R,G,B", value_parser = parse_channels, allow_hyphen_values = true)]
+    pub extinction_scale: Option<DVec3>,
+    /// Play with this single-scattering albedo (0..1) instead of the baked one
+    #[arg(long, value_name = "A|R,G,B", value_parser = parse_channels, allow_hyphen_values = true)]
+    pub albedo: Option<DVec3>,
     /// Draw the frame this many times, for timings
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1_000_000),
           requires = "output")]
@@ -50,6 +61,13 @@ pub struct Args {
     /// Open the window, draw N frames, save what it shows to FILE.png and quit: for tests
     #[arg(long, num_args = 2, value_names = ["N", "FILE.png"], conflicts_with = "output")]
     pub screenshot_after: Option<Vec<String>>,
+}
+
+impl Args {
+    /// The material that is asked for.
+    pub fn edit(&self) -> Edit {
+        Edit { extinction_scale: self.extinction_scale.unwrap_or(DVec3::ONE), albedo: self.albedo }
+    }
 }
 
 /// [`Backend`] on the command line.

@@ -23,6 +23,7 @@ enum Format {
 pub fn run(args: &Args, output: &Path) -> Result<()> {
     let format = format_of(output)?;
     check_paths(args, output)?;
+    args.edit().validate()?;
     let asset = asset::read(&args.asset)?;
     let scene = match &args.scene {
         Some(path) => scene::load(path)?,
@@ -34,6 +35,11 @@ pub fn run(args: &Args, output: &Path) -> Result<()> {
     let mut player = Player::new(&asset, args.backend.into())?;
     if let Some(note) = player.note() {
         eprintln!("note: {note}");
+    }
+    let edit = args.edit();
+    player.edit(&edit)?;
+    if let Some(warning) = edit.warning() {
+        eprintln!("warning: {warning}");
     }
     player.set_reuse(args.reuse);
     let mut stats = Stats::new(&player, &frame, args.frames);

@@ -19,6 +19,10 @@ pub struct Stats {
     samples_per_pixel: u32,
     samples: u64,
     samples_drawn: u64,
+    /// As played, at density 1, 1 / mesh unit.
+    extinction: [f64; 3],
+    /// As played.
+    albedo: [f64; 3],
     /// Lights drawn, those that stand for the environment included.
     lights: usize,
     /// Lights of the scene's list.
@@ -67,6 +71,8 @@ impl Stats {
             samples_per_pixel: frame.samples_per_pixel,
             samples: player.info().samples,
             samples_drawn: 0,
+            extinction: player.info().extinction,
+            albedo: player.info().albedo,
             lights: frame.lights.len(),
             scene_lights: frame.scene_lights,
             frames,

@@ -8,9 +8,9 @@ use super::super::timers::Pass;
 use super::Recorder;
 use wgpu::{
     BindGroup, BindGroupLayout, BlendComponent, BlendFactor, BlendOperation, BlendState, Color,
-    ColorTargetState, ColorWrites, Device, FragmentState, LoadOp, Operations, PrimitiveState,
+    ColorTargetState, ColorWrites, Device, FragmentState, LoadOp, Operations, PipelineLayout, PrimitiveState,
     PrimitiveTopology, RenderPassColorAttachment, RenderPassDescriptor, RenderPipeline,
-    RenderPipelineDescriptor, ShaderStages, StoreOp, TextureView, VertexState,
+    RenderPipelineDescriptor, ShaderModule, ShaderStages, StoreOp, TextureView, VertexState,
 };
 
 const ADD: BlendComponent = BlendComponent {
@@ -22,6 +22,11 @@ const ADD: BlendComponent = BlendComponent {
 /// See splat.wgsl.
 pub(crate) struct Splat {
     layout: BindGroupLayout,
+    pipeline_layout: PipelineLayout,
+    module: ShaderModule,
+    heterogeneous: bool,
+    /// Whether the pipeline takes all channels for alike.
+    grey: bool,
     pipeline: RenderPipeline,
 }
 
@@ -30,20 +35,39 @@ impl Splat {
         let layout = layout(device, "splat", ShaderStages::VERTEX_FRAGMENT, &[Slot::Read; 5]);
         let pipeline_layout = pipeline_layout(device, "splat", common, &layout);
         let module = shaders::module(device, "splat", shaders::SPLAT);
-        let constants = [
-            ("GREY", f64::from(u8::from(asset.grey))),
-            ("HETEROGENEOUS", f64::from(u8::from(asset.heterogeneous))),
-        ];
+        let (heterogeneous, grey) = (asset.heterogeneous, asset.material.is_grey());
+        let pipeline = Self::pipeline(device, &pipeline_layout, &module, heterogeneous, grey);
+        Self { layout, pipeline_layout, module, heterogeneous, grey, pipeline }
+    }
+
+    /// Compiles the pass anew where the channels become alike or stop being so.
+    pub fn set_grey(&mut self, device: &Device, grey: bool) {
+        if grey != self.grey {
+            self.grey = grey;
+            self.pipeline =
+                Self::pipeline(device, &self.pipeline_layout, &self.module, self.heterogeneous, grey);
+        }
+    }
+
+    fn pipeline(
+        device: &Device,
+        layout: &PipelineLayout,
+        module: &ShaderModule,
+        heterogeneous: bool,
+        grey: bool,
+    ) -> RenderPipeline {
+        let constants =
+            [("GREY", f64::from(u8::from(grey))), ("HETEROGENEOUS", f64::from(u8::from(heterogeneous)))];
         let target = Some(ColorTargetState {
             format: SUM_FORMAT,
             blend: Some(BlendState { color: ADD, alpha: ADD }),
             write_mask: ColorWrites::ALL,
         });
-        let pipeline = device.create_render_pipeline(&RenderPipelineDescriptor {
+        device.create_render_pipeline(&RenderPipelineDescriptor {
             label: Some("splat"),
-            layout: Some(&pipeline_layout),
+            layout: Some(layout),
             vertex: VertexState {
-                module: &module,
+                module,
                 entry_point: Some("outline"),
                 compilation_options: options(&constants),
                 buffers: &[],
@@ -52,15 +76,14 @@ impl Splat {
             depth_stencil: None,
             multisample: Default::default(),
             fragment: Some(FragmentState {
-                module: &module,
+                module,
                 entry_point: Some("add"),
                 compilation_options: options(&constants),
                 targets: &[target.clone(), target],
             }),
             multiview_mask: None,
             cache: None,
-        });
-        Self { layout, pipeline }
+        })
     }
 
     pub fn bind(&self, device: &Device, asset: &AssetBuffers, targets: &Targets, piece: usize) -> BindGroup {

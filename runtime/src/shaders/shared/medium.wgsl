@@ -14,6 +14,9 @@ struct Medium {
     ior: f32,
     grid_size: vec3u,
     triangles: u32,
+    means: vec3f,           // s of formats/src/slopes.rs for baked light
+    most_extinction: f32,   // the largest channel's, at density 1
+    steepest: f32,          // largest slope per unit of sharpness
 }
 
 @group(0) @binding(1) var<uniform> medium: Medium;

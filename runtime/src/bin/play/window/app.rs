@@ -6,6 +6,7 @@ use super::panel;
 use super::screen::Screen;
 use super::session::Session;
 use anyhow::{Result, anyhow};
+use diaphane_runtime::edit::Edit;
 use diaphane_runtime::exact::ExactDepths;
 use diaphane_runtime::frame::Frame;
 use diaphane_runtime::gpu::Statistics;
@@ -51,6 +52,7 @@ pub(super) struct View {
 pub(super) struct Shown {
     pub frame: Frame,
     pub mode: LightMode,
+    pub edit: Edit,
     pub exact: Option<ExactDepths>,
     pub rays: u32,
 }

@@ -30,19 +30,23 @@ impl App {
         let moving = self.errand.is_none() && view.changed.elapsed() < SETTLING;
         let divisor = view.pace.divisor(moving);
         let frame = self.session.frame(view.place, divisor)?;
-        let same = view.shown.as_ref().is_some_and(|s| s.frame == frame && s.mode == self.session.mode);
+        let (mode, edit) = (self.session.mode, self.session.edit);
+        let same = view.shown.as_ref().is_some_and(|s| s.frame == frame && s.mode == mode && s.edit == edit);
         if !same {
             // A finer or coarser picture of the same is no change; rounding its size moves the right edge a little.
             let stays = view.shown.as_ref().is_some_and(|s| {
                 let (width, height) = (s.frame.width, s.frame.height);
                 let view = View { right: s.frame.view.right, ..frame.view };
-                s.mode == self.session.mode && Frame { width, height, view, ..frame.clone() } == s.frame
+                s.mode == mode && s.edit == edit && Frame { width, height, view, ..frame.clone() } == s.frame
             });
             if !stays {
                 view.changed = Instant::now();
             }
+            if view.shown.as_ref().is_none_or(|s| s.edit != edit) {
+                view.screen.set_material(&edit.apply(&self.session.asset.info)?);
+            }
             let exact = self.session.trace(&frame);
-            view.shown = Some(Shown { frame, mode: self.session.mode, exact, rays: 0 });
+            view.shown = Some(Shown { frame, mode, edit, exact, rays: 0 });
         }
         let Some(shown) = &mut view.shown else {
             return Ok(());
@@ -124,6 +128,8 @@ impl App {
                     fov_degrees: &mut self.session.orbit.fov_degrees,
                     exposure: &mut exposure,
                     mode: &mut self.session.mode,
+                    edit: &mut self.session.edit,
+                    baked_albedo: DVec3::from(self.session.asset.info.albedo),
                     refracts: self.session.asset.info.ior != 1.0,
                     centre: DVec3::from(self.session.asset.info.centre),
                     diagonal: f64::from(self.session.asset.info.diagonal()),

@@ -47,6 +47,11 @@ pub fn run(args: &Args) -> Result<()> {
         None => default_scene(&asset.info),
     };
     let mode = args.light.map_or(LightMode::Auto, Into::into);
+    let edit = args.edit();
+    let session = Session::new(asset, scene, mode, edit)?;
+    if let Some(warning) = edit.warning() {
+        eprintln!("warning: {warning}");
+    }
     let event_loop = EventLoop::new().map_err(|e| {
         // The reason follows the place in winit's source that noticed it.
         let text = e.to_string();
@@ -54,7 +59,7 @@ pub fn run(args: &Args) -> Result<()> {
         anyhow!("no display to open a window on ({reason}); draw a picture with --output instead")
     })?;
     let title = args.asset.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
-    let mut app = App::new(Session::new(asset, scene, mode)?, title, errand);
+    let mut app = App::new(session, title, errand);
     event_loop.run_app(&mut app).context("the window failed")?;
     app.finish()
 }

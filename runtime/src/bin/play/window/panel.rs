@@ -1,10 +1,14 @@
 //! The side panel: what it shows of a session and what it changes in it.
 
 use diaphane_formats::scene::{Light, Scene};
+use diaphane_runtime::edit::Edit;
 use diaphane_runtime::gpu::Statistics;
 use diaphane_runtime::player::LightMode;
-use egui::{CollapsingHeader, DragValue, Grid, RichText, Slider, Ui};
+use egui::{CollapsingHeader, DragValue, Grid, RichText, Slider, SliderClamping, Ui};
 use glam::DVec3;
+
+/// Factors on the extinction that sliders offer.
+const SCALES: std::ops::RangeInclusive<f64> = 0.25..=4.0;
 
 /// Points across.
 pub const WIDTH: f32 = 300.0;
@@ -15,6 +19,8 @@ pub struct Contents<'a> {
     pub fov_degrees: &'a mut f64,
     pub exposure: &'a mut f32,
     pub mode: &'a mut LightMode,
+    pub edit: &'a mut Edit,
+    pub baked_albedo: DVec3,
     /// Whether the surface reflects at all.
     pub refracts: bool,
     /// The object's middle and diagonal, for new lights and the speed of dragging.
@@ -53,6 +59,8 @@ pub fn show(ui: &mut Ui, contents: &mut Contents) -> Option<Action> {
         statistics(ui, &contents.numbers);
         ui.separator();
         action = picture(ui, contents);
+        ui.separator();
+        material(ui, contents.edit, contents.baked_albedo);
         ui.separator();
         lights(ui, contents);
     });
@@ -134,6 +142,39 @@ fn picture(ui: &mut Ui, contents: &mut Contents) -> Option<Action> {
     ui.label(RichText::new(contents.message).small());
     ui.label(RichText::new("drag: turn   right drag: move   wheel: distance").small());
     action
+}
+
+/// Factors on the extinction, all channels together and one by one, and the albedo.
+fn material(ui: &mut Ui, edit: &mut Edit, baked_albedo: DVec3) {
+    let slider = |ui: &mut Ui, value: &mut f64, name: &str| {
+        // What the command line asked for may lie outside.
+        let slider = Slider::new(value, SCALES).logarithmic(true).clamping(SliderClamping::Edits);
+        ui.add(slider.text(name)).changed()
+    };
+    let scale = &mut edit.extinction_scale;
+    let before = scale.max_element();
+    let mut all = before;
+    if slider(ui, &mut all, "extinction x") {
+        *scale = if before > 0.0 { *scale * (all / before) } else { DVec3::splat(all) };
+    }
+    CollapsingHeader::new("Channels").default_open(false).show(ui, |ui| {
+        slider(ui, &mut scale.x, "red x");
+        slider(ui, &mut scale.y, "green x");
+        slider(ui, &mut scale.z, "blue x");
+    });
+    if let Some(warning) = edit.warning() {
+        ui.label(RichText::new(warning).small());
+    }
+    ui.horizontal(|ui| {
+        let mut rgb = edit.albedo.unwrap_or(baked_albedo).as_vec3().to_array();
+        if ui.color_edit_button_rgb(&mut rgb).changed() {
+            edit.albedo = Some(DVec3::from_array(rgb.map(f64::from)).clamp(DVec3::ZERO, DVec3::ONE));
+        }
+        ui.label("albedo");
+        if ui.button("as baked").on_hover_text("The material that was baked").clicked() {
+            *edit = Edit::default();
+        }
+    });
 }
 
 fn lights(ui: &mut Ui, contents: &mut Contents) {

@@ -1,7 +1,7 @@
 //! The window's surface and what is drawn on it: the picture on the left, the panel over it.
 
 use anyhow::{Context, Result, anyhow};
-use diaphane_formats::asset::Asset;
+use diaphane_formats::asset::{Asset, Info};
 use diaphane_runtime::Error;
 use diaphane_runtime::gpu::{GpuDevice, Renderer, Request, instance, read_texture};
 use egui::{ClippedPrimitive, TexturesDelta};
@@ -90,6 +90,11 @@ impl Screen {
     /// Columns and rows of the surface.
     pub fn size(&self) -> [u32; 2] {
         [self.config.width, self.config.height]
+    }
+
+    /// Takes extinction and albedo from an edited asset's parameters, for the next picture.
+    pub fn set_material(&mut self, info: &Info) {
+        self.renderer.set_material(&self.gpu.device, &self.gpu.queue, info);
     }
 
     /// Draws rays of a picture without showing it, and waits for them.

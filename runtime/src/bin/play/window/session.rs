@@ -4,6 +4,7 @@ use super::orbit::Orbit;
 use anyhow::Result;
 use diaphane_formats::asset::Asset;
 use diaphane_formats::scene::Scene;
+use diaphane_runtime::edit::Edit;
 use diaphane_runtime::exact::{DepthTracer, ExactDepths};
 use diaphane_runtime::frame::{Frame, FrameLight};
 use diaphane_runtime::player::LightMode;
@@ -17,6 +18,8 @@ pub struct Session {
     /// Lights and surface; camera and size come from elsewhere.
     pub scene: Scene,
     pub mode: LightMode,
+    /// The material, relative to the baked one.
+    pub edit: Edit,
     pub orbit: Orbit,
     pub first_orbit: Orbit,
     /// Lights that stand for the environment, projected once.
@@ -28,8 +31,9 @@ impl Session {
     /// Starts with a scene.
     ///
     /// # Errors
-    /// A scene or asset that makes no sense.
-    pub fn new(asset: Asset, scene: Scene, mode: LightMode) -> Result<Self> {
+    /// A scene, asset or edit that makes no sense.
+    pub fn new(asset: Asset, scene: Scene, mode: LightMode, edit: Edit) -> Result<Self> {
+        edit.validate()?;
         let all = Frame::new(&scene, &asset.info)?;
         let orbit = Orbit::new(&scene.camera, f64::from(asset.info.diagonal()));
         Ok(Self {
@@ -39,6 +43,7 @@ impl Session {
             asset,
             scene,
             mode,
+            edit,
             orbit,
         })
     }
