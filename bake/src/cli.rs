@@ -4,9 +4,8 @@ use crate::inspect;
 use crate::terminal::Bars;
 use anyhow::{Context, bail};
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use diaphane_bake::params::{Params, Preset};
+use diaphane_bake::params::{Params, Preset, Representation};
 use diaphane_bake::{Input, bake};
-use diaphane_formats::encoding::Encoding;
 use diaphane_formats::{asset, files, material, mesh};
 use std::path::{Path, PathBuf};
 
@@ -72,7 +71,7 @@ struct BakeArguments {
     #[arg(long, value_name = "E")]
     light_error: Option<f64>,
     /// What the harmonics represent.
-    #[arg(long, value_enum, default_value_t = EncodingName::Reciprocal)]
+    #[arg(long, value_enum, default_value_t = EncodingName::Lobe)]
     encoding: EncodingName,
     /// Seed of all random choices.
     #[arg(long, value_name = "S")]
@@ -108,7 +107,7 @@ enum PresetName {
 enum EncodingName {
     /// 1/(τ+ε), fitted to the transmittance.
     Reciprocal,
-    /// The same with a lobe towards the nearest surface beside the harmonics.
+    /// The same, with a lobe towards the nearest surface for samples that it helps.
     Lobe,
     /// The optical depth τ, fitted to the transmittance.
     Depth,
@@ -131,11 +130,11 @@ impl BakeArguments {
         params.seed = self.seed.unwrap_or(params.seed);
         params.certificate = !self.no_certificate;
         params.max_error = self.max_error;
-        params.encoding = match self.encoding {
-            EncodingName::Reciprocal => Encoding::RECIPROCAL,
-            EncodingName::Lobe => Encoding::LOBE,
-            EncodingName::Depth => Encoding::Depth,
-            EncodingName::Transmittance => Encoding::Transmittance,
+        params.representation = match self.encoding {
+            EncodingName::Reciprocal => Representation::Reciprocal,
+            EncodingName::Lobe => Representation::Lobe,
+            EncodingName::Depth => Representation::Depth,
+            EncodingName::Transmittance => Representation::Transmittance,
         };
         params
     }

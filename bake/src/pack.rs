@@ -64,7 +64,7 @@ pub(crate) fn pack(
         order: params.order as u32,
         light_error: params.light_error,
         boundary_order: boundary_order(medium.ior(), params.order) as u32,
-        encoding: params.encoding,
+        encoding: light.encoding,
         reference_extinction: medium.reference_extinction(),
         width_factor: params.width_factor,
         certificate: None,

@@ -1,7 +1,6 @@
 //! What a user can choose about a bake.
 
 use crate::{Error, Result};
-use diaphane_formats::encoding::Encoding;
 use diaphane_formats::sh::MAX_ORDER;
 
 /// Parameters of a bake. [`Params::default`] is the preset `standard`.
@@ -21,7 +20,7 @@ pub struct Params {
     /// Seed of all random choices.
     pub seed: u64,
     /// What the harmonics represent.
-    pub encoding: Encoding,
+    pub representation: Representation,
     /// Full width at half maximum of a kernel in disk radii.
     pub width_factor: f32,
     /// Whether the bake measures its own error.
@@ -45,6 +44,19 @@ pub const RADIUS_EXPONENT: f64 = 0.3;
 /// Samples closer to the boundary than this many radii are moved onto it.
 pub const BOUNDARY_SNAP: f64 = 0.3;
 
+/// The function of optical depth that is expanded in spherical harmonics, see [`diaphane_formats::encoding`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Representation {
+    /// ψ, the thesis' choice.
+    Transmittance,
+    /// τ.
+    Depth,
+    /// 1/(τ + ε); the bake chooses ε.
+    Reciprocal,
+    /// The same, with a lobe towards the nearest surface where that comes nearer for the same bytes.
+    Lobe,
+}
+
 /// Named sets of parameters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Preset {
@@ -61,8 +73,8 @@ impl Params {
     pub fn preset(preset: Preset) -> Self {
         let (samples, directions, points_per_sample, order, light_error) = match preset {
             Preset::Draft => (5_000, 96, 4, 6, 0.03),
-            Preset::Standard => (50_000, 512, 6, 10, 0.01),
-            Preset::Fine => (50_000, 512, 16, 14, 0.003),
+            Preset::Standard => (50_000, 768, 4, 10, 0.01),
+            Preset::Fine => (50_000, 1_536, 4, 14, 0.003),
         };
         Self {
             samples,
@@ -71,7 +83,7 @@ impl Params {
             order,
             light_error,
             seed: 1,
-            encoding: Encoding::RECIPROCAL,
+            representation: Representation::Lobe,
             width_factor: 1.35,
             certificate: true,
             max_error: None,

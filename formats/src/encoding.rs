@@ -6,7 +6,7 @@
 //! - ψ = exp(-κ̄m): the thesis' choice (section 3.3.1), the documented baseline;
 //! - τ = κ̄m;
 //! - 1/(κ̄m + ε): near a flat boundary this is a clamped cosine, which few bands capture, where ψ is almost a step;
-//! - the same, a lobe max(a·ω, 0) with one vector a for each sample taken out: the cosine of the nearest surface.
+//! - the same, from which samples near a flat surface have a lobe max(a·ω, 0) taken out: the cosine of that surface.
 //!
 //! Values outside the range that makes sense stand for its ends, so that a fit to ψ is free there. Zero coefficients
 //! mean darkness in all but τ.
@@ -26,7 +26,7 @@ pub enum Encoding {
         /// ε > 0 bounds the function where light enters at once.
         epsilon: f32,
     },
-    /// 1/(τ + ε) less a lobe for each sample.
+    /// 1/(τ + ε), for some samples less a lobe.
     Lobe {
         /// As above.
         epsilon: f32,
@@ -34,7 +34,7 @@ pub enum Encoding {
 }
 
 impl Encoding {
-    /// The default: ε = 0.1.
+    /// The reciprocal with ε = 0.1.
     pub const RECIPROCAL: Self = Self::Reciprocal { epsilon: 0.1 };
     /// The lobe with the same ε.
     pub const LOBE: Self = Self::Lobe { epsilon: 0.1 };

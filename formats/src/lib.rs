@@ -20,6 +20,7 @@ pub mod fresnel;
 pub mod harmonics;
 pub mod hits;
 pub mod kernel;
+pub mod lobe;
 pub mod material;
 pub mod medium;
 pub mod mesh;

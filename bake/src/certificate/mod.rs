@@ -24,6 +24,8 @@ use crate::progress::Stage;
 use crate::{Prepared, Result};
 use diaphane_formats::asset::{self, Asset, Certificate, CertifiedError};
 use diaphane_formats::directions::{even_directions, hash};
+use diaphane_formats::slopes::means_share;
+use glam::Vec3;
 use play::{Player, Stored};
 use pool::Pictures;
 use truth::Nodes;
@@ -55,13 +57,14 @@ pub(crate) fn measure(
     let player = Player::new(&asset, &views);
 
     let truth = nodes.radiance(shape, medium, &lights, stage)?;
+    let means = means_share(asset.info.ratio());
     let stored = Stored::new(&asset, &lights);
-    let played = player.radiance(LIGHTS, |i, l| stored.arriving(i, l, l % 3), stage)?;
+    let played = player.radiance(LIGHTS, |i, l| stored.arriving(i, l, l % 3), means, stage)?;
     let pictures =
         Pictures { views: &views, lights: &lights, phase: asset.info.phase, truth: &truth, played: &played };
 
     let exact = exact::means(shape, medium, lit, EXACT.map(|l| (lights[l], l % 3)), stage)?;
-    let played = player.radiance(EXACT.len(), |i, l| exact[l][i], stage)?;
+    let played = player.radiance(EXACT.len(), |i, l| exact[l][i], Vec3::ONE, stage)?;
     let exact_lights = EXACT.map(|l| lights[l]);
     let exact_truth = EXACT.map(|l| truth[l].clone());
     let near = Pictures { lights: &exact_lights, truth: &exact_truth, played: &played, ..pictures };

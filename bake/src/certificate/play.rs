@@ -8,9 +8,8 @@ use diaphane_formats::harmonics::Coefficients;
 use diaphane_formats::hits::{Hit, Hits};
 use diaphane_formats::reconstruct::{Along, Cloud, Profile};
 use diaphane_formats::sh;
-use diaphane_formats::slopes::{Source, Stencil, means_share};
+use diaphane_formats::slopes::{Source, Stencil};
 use glam::{DVec3, Vec3};
-use half::f16;
 use rayon::prelude::*;
 
 /// Inside pieces of a ray that players draw.
@@ -83,11 +82,13 @@ impl<'a> Player<'a> {
     }
 
     /// Radiance of every ray, phase function left out, for each of `lights` lights, light l in channel l % 3 alone;
-    /// `arriving` gives ψβ of a light at a sample for that channel.
+    /// `arriving` gives ψβ of a light at a sample for that channel, `means` its share of the correction for means
+    /// ([`diaphane_formats::slopes`]).
     pub fn radiance(
         &self,
         lights: usize,
         arriving: impl Fn(usize, usize) -> f32 + Sync,
+        means: Vec3,
         stage: Stage<'_>,
     ) -> Result<Vec<Vec<f32>>> {
         let albedo = DVec3::from(self.asset.info.albedo).as_vec3();
@@ -103,7 +104,7 @@ impl<'a> Player<'a> {
             };
             let values: Vec<Vec3> =
                 (0..self.asset.samples.len()).into_par_iter().with_min_len(256).map(value).collect();
-            let sources = self.stencil.sources(&values, means_share(self.asset.info.ratio()));
+            let sources = self.stencil.sources(&values, means);
             let radiance: Vec<Vec3> = self
                 .rays
                 .par_iter()
@@ -182,7 +183,7 @@ impl<'a> Stored<'a> {
             .samples
             .lobe
             .get(i)
-            .map_or(0.0, |a| Vec3::from(a.map(f16::to_f32)).dot(*direction).max(0.0));
+            .map_or(0.0, |a| a.dot(*direction).max(0.0));
         let tau = self.asset.info.encoding.decode(dot(self.depth.of(i)) + lobe);
         if tau == f32::INFINITY { 0.0 } else { (-self.ratio[channel] * tau).exp() * through }
     }

@@ -12,7 +12,7 @@ use crate::samples::{Candidate, Placed};
 use crate::{Error, Prepared, Result};
 use diaphane_formats::directions::{even_directions, hash};
 use diaphane_formats::visibility::{DepthRows, project_with};
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 /// Samples that receive light, with their transmittance.
@@ -20,6 +20,8 @@ pub(crate) struct Lit {
     pub samples: Vec<Candidate>,
     /// What each sample stands for.
     pub cells: Cells,
+    /// Unit vector towards the nearest surface, 0 for samples further from it than [`NEAR`] radii.
+    pub surface: Vec<Vec3>,
     pub probes: Vec<Candidate>,
     /// Unit vectors: the first half, then their opposites in the same order.
     pub directions: Vec<DVec3>,
@@ -36,6 +38,9 @@ pub(crate) struct Lit {
 
 /// Points of a cell for each one that a direction sees.
 const TURNS: usize = 4;
+
+/// Samples closer to the surface than this many disk radii may be lit by a face alone.
+const NEAR: f64 = 2.0;
 
 /// Pairs of opposite directions projected before their rows are turned into columns: bounds the memory of the rows.
 const GROUP: usize = 8;
@@ -124,8 +129,10 @@ pub(crate) fn depths(
         }
         cells.retain(&keep);
     }
+    let samples: Vec<Candidate> = (0..n).filter(|i| keep[*i]).map(|i| placed.samples[i]).collect();
     Ok(Lit {
-        samples: (0..n).filter(|i| keep[*i]).map(|i| placed.samples[i]).collect(),
+        surface: samples.par_iter().map(|s| towards_surface(shape, s)).collect(),
+        samples,
         cells,
         probes: placed.probes,
         directions,
@@ -136,6 +143,16 @@ pub(crate) fn depths(
         dark_candidates: placed.dark,
         rays: (n * count * d) as u64,
     })
+}
+
+/// Towards the nearest point of the mesh, or out of the triangle that the sample lies on.
+fn towards_surface(shape: &Shape<'_>, sample: &Candidate) -> Vec3 {
+    let Some(nearest) = shape.accel.nearest(sample.position, NEAR * sample.radius) else { return Vec3::ZERO };
+    let there = nearest.point - sample.position;
+    // Samples on the boundary are as close to it as their stored position's rounding.
+    let on_it = there.length() < 1e-2 * sample.radius;
+    let direction = if on_it { shape.accel.normal(nearest.triangle) } else { there.normalize_or_zero() };
+    direction.as_vec3()
 }
 
 fn compact(values: &mut Vec<f32>, keep: &[bool], width: usize) {

@@ -68,6 +68,13 @@ pub(super) fn coefficient_places(order: usize) -> Vec<usize> {
     places(order, 0).chain(places(order, 1)).collect()
 }
 
+/// Coefficients from unknowns whose places `places` tells; what follows them is left out.
+pub(super) fn in_order<'a>(places: &[usize], unknowns: impl Iterator<Item = &'a f32>) -> Vec<f32> {
+    let mut out = vec![0.0; places.len()];
+    places.iter().zip(unknowns).for_each(|(at, x)| out[*at] = *x);
+    out
+}
+
 /// What is fitted: rows are functions, columns directions.
 pub(super) struct Batch<'a> {
     /// Basis values of even and of odd bands.

@@ -1,5 +1,6 @@
 //! What every sample carries: optical depth over all directions as spherical harmonics, and the kernel's weight.
 
+mod boundary;
 mod cells;
 mod depths;
 mod harmonics;
@@ -7,5 +8,6 @@ mod least_squares;
 mod weights;
 
 pub(crate) use depths::{Lit, depths};
-pub(crate) use harmonics::{Light, boundary_order, harmonics};
+pub(crate) use boundary::boundary_order;
+pub(crate) use harmonics::{Light, harmonics};
 pub(crate) use weights::weights;

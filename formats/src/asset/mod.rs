@@ -25,7 +25,10 @@ use glam::{DVec3, Vec3};
 use half::f16;
 
 /// Version of the file format that this build writes and reads.
-pub const FORMAT_VERSION: u32 = 2;
+pub const FORMAT_VERSION: u32 = 3;
+
+/// Set in a sample's stored number of bands where it has a lobe.
+const HAS_LOBE: u8 = 0x80;
 
 /// A baked object.
 #[derive(Clone, Debug, PartialEq)]
@@ -53,8 +56,9 @@ pub struct Samples {
     pub weight: Vec<f32>,
     /// Spherical harmonics of the encoded optical depth, each sample with its own order.
     pub depth: Harmonics,
-    /// Vector a of the lobe max(a·ω, 0) that is added to them; empty unless the encoding has lobes.
-    pub lobe: Vec<[f16; 3]>,
+    /// Vector a of the lobe max(a·ω, 0) that is added to them (as [`crate::lobe`] stores it), 0 for samples without;
+    /// empty unless the encoding has lobes.
+    pub lobe: Vec<Vec3>,
     /// Spherical harmonics of the boundary's Fresnel transmittance product, all of
     /// [`Info::boundary_order`]; empty when index matched.
     pub boundary: Harmonics,
@@ -148,7 +152,7 @@ impl Asset {
         let finite = |values: &[f32]| values.iter().all(|v| v.is_finite());
         if !s.position_radius.iter().all(|p| finite(p) && p[3] > 0.0)
             || !s.weight.iter().all(|w| w.is_finite() && *w >= 0.0)
-            || !s.lobe.iter().flatten().all(|v| v.is_finite())
+            || !s.lobe.iter().all(|v| v.is_finite())
         {
             return fail("sample values");
         }

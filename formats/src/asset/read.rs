@@ -1,9 +1,10 @@
 //! Bytes to asset. Survives any byte string; allocates no more than a small multiple of the file's size.
 
 use super::container::{self, Kind, Section};
-use super::{Asset, DensityGrid, FORMAT_VERSION, Info, Places, Samples, codec};
+use super::{Asset, DensityGrid, FORMAT_VERSION, HAS_LOBE, Info, Places, Samples, codec};
 use crate::harmonics::Harmonics;
-use crate::{Error, Result, files};
+use crate::{Error, Result, files, lobe};
+use glam::Vec3;
 use half::f16;
 use std::path::Path;
 
@@ -24,10 +25,11 @@ pub fn parse(bytes: &[u8]) -> Result<Asset> {
     };
     let info: Info = codec::decode(need(Kind::Info)?)?;
     let places = Places::new(info.bounds);
-    let (offset, order): (Vec<[i8; 4]>, Vec<u8>) = groups(need(Kind::Offset)?)?
+    let (offset, bands): (Vec<[i8; 4]>, Vec<u8>) = groups(need(Kind::Offset)?)?
         .into_iter()
-        .map(|[x, y, z, order]: [u8; 4]| ([x as i8, y as i8, z as i8, 0], order))
+        .map(|[x, y, z, bands]: [u8; 4]| ([x as i8, y as i8, z as i8, 0], bands))
         .unzip();
+    let lobes = find(Kind::Lobe)?.map(words).transpose()?;
     let halves_of = |kind: Kind| find(kind)?.map_or(Ok(Vec::new()), halves);
     let floats_of = |kind: Kind| find(kind)?.map_or(Ok(Vec::new()), floats);
     let boundary_scale = halves_of(Kind::BoundaryScale)?;
@@ -38,12 +40,12 @@ pub fn parse(bytes: &[u8]) -> Result<Asset> {
             offset,
             weight: halves(need(Kind::Weight)?)?.into_iter().map(f16::to_f32).collect(),
             depth: Harmonics {
-                order,
+                order: bands.iter().map(|b| b & !HAS_LOBE).collect(),
                 scale: halves(need(Kind::DepthScale)?)?,
                 profile: floats(need(Kind::DepthProfile)?)?,
                 codes: need(Kind::Depth)?.to_vec(),
             },
-            lobe: groups(&halves_of(Kind::Lobe)?)?,
+            lobe: lobes.map_or(Ok(Vec::new()), |codes| spread(&codes, &bands))?,
             boundary: Harmonics {
                 order: vec![boundary_order; boundary_scale.len()],
                 scale: boundary_scale,
@@ -96,6 +98,17 @@ fn place(bytes: &[u8], places: &Places) -> Result<Vec<[f32; 4]>> {
         [x, y, z, places.radius(f16::from_bits(word(c, 3)))]
     };
     Ok(chunks.iter().map(one).collect())
+}
+
+/// The lobe of every sample, from the codes of those that have one.
+fn spread(codes: &[u32], bands: &[u8]) -> Result<Vec<Vec3>> {
+    let mut next = codes.iter();
+    let one = |bands: &u8| match bands & HAS_LOBE {
+        0 => Ok(Vec3::ZERO),
+        _ => next.next().map(|code| lobe::vector(*code)).ok_or_else(ragged),
+    };
+    let lobes = bands.iter().map(one).collect::<Result<_>>()?;
+    if next.next().is_some() { Err(ragged()) } else { Ok(lobes) }
 }
 
 fn floats(bytes: &[u8]) -> Result<Vec<f32>> {

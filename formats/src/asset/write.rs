@@ -1,8 +1,8 @@
 //! Asset to bytes.
 
 use super::container::{self, Kind};
-use super::{Asset, FORMAT_VERSION, Places, codec};
-use crate::{Result, files};
+use super::{Asset, FORMAT_VERSION, HAS_LOBE, Places, codec};
+use crate::{Result, files, lobe};
 use glam::Vec3;
 use half::f16;
 use std::path::Path;
@@ -22,19 +22,24 @@ pub fn encode(asset: &Asset) -> Result<Vec<u8>> {
         let [x, y, z] = places.code(Vec3::new(p[0], p[1], p[2]).as_dvec3());
         [x, y, z, places.radius_code(f64::from(p[3])).to_bits()].map(u16::to_le_bytes)
     };
-    let offset = |(o, order): (&[i8; 4], &u8)| [o[0] as u8, o[1] as u8, o[2] as u8, *order];
+    let lobes: Vec<u32> = s.lobe.iter().map(|a| lobe::code(*a)).collect();
+    let mark = |i: usize| if lobes.get(i).is_some_and(|code| *code != 0) { HAS_LOBE } else { 0 };
+    let offset = |(i, (o, order)): (usize, (&[i8; 4], &u8))| {
+        [o[0] as u8, o[1] as u8, o[2] as u8, *order | mark(i)]
+    };
     let weight: Vec<f16> = s.weight.iter().map(|w| f16::from_f32(*w)).collect();
     let mut sections = vec![
         (Kind::Info, codec::encode(&asset.info)?),
         (Kind::Place, s.position_radius.iter().flat_map(place).flatten().collect()),
-        (Kind::Offset, s.offset.iter().zip(&s.depth.order).flat_map(offset).collect()),
+        (Kind::Offset, s.offset.iter().zip(&s.depth.order).enumerate().flat_map(offset).collect()),
         (Kind::Weight, halves(&weight)),
         (Kind::DepthProfile, floats(&mut s.depth.profile.iter().copied())),
         (Kind::DepthScale, halves(&s.depth.scale)),
         (Kind::Depth, s.depth.codes.clone()),
     ];
     if !s.lobe.is_empty() {
-        sections.push((Kind::Lobe, halves(s.lobe.as_flattened())));
+        let codes = lobes.iter().filter(|code| **code != 0);
+        sections.push((Kind::Lobe, codes.flat_map(|code| code.to_le_bytes()).collect()));
     }
     if !s.boundary.is_empty() {
         sections.push((Kind::BoundaryProfile, floats(&mut s.boundary.profile.iter().copied())));

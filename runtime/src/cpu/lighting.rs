@@ -59,7 +59,7 @@ impl Lighting {
             encoding: info.encoding,
             order: info.order.max(info.boundary_order) as usize,
             depth: asset.samples.depth.decoded(),
-            lobe: asset.samples.lobe.iter().map(|a| Vec3::from(a.map(|v| v.to_f32()))).collect(),
+            lobe: asset.samples.lobe.clone(),
             boundary: asset.samples.boundary.decoded(),
         };
         lighting.set_material(info);

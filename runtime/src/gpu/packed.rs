@@ -22,7 +22,8 @@ pub(super) fn records(samples: &Samples) -> Vec<[u32; 4]> {
         .into_iter()
         .enumerate()
         .map(|(i, start)| {
-            let lobe = samples.lobe.get(i).copied().unwrap_or_default().map(f16::to_bits);
+            let lobe = samples.lobe.get(i).copied().unwrap_or_default();
+            let lobe = lobe.to_array().map(|v| f16::from_f32(v).to_bits());
             let boundary = samples.boundary.scale.get(i).copied().unwrap_or_default().to_bits();
             [
                 start as u32,

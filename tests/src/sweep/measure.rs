@@ -139,7 +139,7 @@ pub fn grid(object: &Object<'_>, made: &Made, baked: &Baked) -> Option<Grid> {
     let settings = grid::Settings {
         nodes,
         order: baked.order,
-        encoding: baked.encoding.encoding(),
+        encoding: made.asset.info.encoding,
         directions: baked.directions,
     };
     Grid::new(object, settings)

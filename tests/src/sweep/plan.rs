@@ -2,8 +2,7 @@
 //! the rivals at the same samples.
 
 use super::record::Method;
-use diaphane_bake::params::{Params, Preset};
-use diaphane_formats::encoding::Encoding;
+use diaphane_bake::params::{Params, Preset, Representation};
 
 /// Lists of values along each axis, and what is held fixed.
 #[derive(Clone, Debug)]
@@ -48,9 +47,9 @@ pub struct Base {
 /// Encodings by name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum EncodingName {
-    /// 1/(τ+ε), the default
+    /// 1/(τ+ε)
     Reciprocal,
-    /// The same with a lobe towards the nearest surface beside the harmonics
+    /// The same with a lobe towards the nearest surface where that helps, the default
     Lobe,
     /// The optical depth τ
     Depth,
@@ -70,12 +69,12 @@ impl EncodingName {
     }
 
     /// What the bake is told.
-    pub fn encoding(self) -> Encoding {
+    pub fn representation(self) -> Representation {
         match self {
-            Self::Reciprocal => Encoding::RECIPROCAL,
-            Self::Lobe => Encoding::LOBE,
-            Self::Depth => Encoding::Depth,
-            Self::Transmittance => Encoding::Transmittance,
+            Self::Reciprocal => Representation::Reciprocal,
+            Self::Lobe => Representation::Lobe,
+            Self::Depth => Representation::Depth,
+            Self::Transmittance => Representation::Transmittance,
         }
     }
 }
@@ -133,7 +132,7 @@ impl Baked {
             samples: self.samples,
             order: self.order,
             directions: self.directions,
-            encoding: self.encoding.encoding(),
+            representation: self.encoding.representation(),
             seed,
             ..self.preset.params()
         }
@@ -164,7 +163,7 @@ impl Axes {
         let base = Baked {
             samples: self.base.samples,
             order: self.base.order,
-            encoding: EncodingName::Reciprocal,
+            encoding: EncodingName::Lobe,
             directions: self.base.directions,
             preset: PresetName::Standard,
         };

@@ -1,0 +1,42 @@
+//! Spherical harmonics of the boundary's Fresnel transmittance, where the boundary is not index matched.
+
+use super::depths::Lit;
+use super::least_squares::{BATCH, Basis, Batch, coefficient_places, in_order};
+use crate::params::Params;
+use diaphane_formats::harmonics::{Coefficients, Harmonics};
+use ndarray::Array2;
+use rayon::prelude::*;
+
+/// Bands of the boundary's transmittance, which varies little where light gets through.
+pub(super) const BOUNDARY_ORDER: usize = 6;
+
+/// Bands of the boundary's transmittance at most `order`; 0 when index matched.
+pub(crate) fn boundary_order(ior: f64, order: usize) -> usize {
+    if ior == 1.0 { 0 } else { order.min(BOUNDARY_ORDER) }
+}
+
+/// Linear fit weighted by the transmittance of the medium: the boundary matters where light arrives.
+pub(super) fn boundary(lit: &Lit, basis: &Basis, params: &Params) -> Harmonics {
+    if lit.boundary.is_empty() {
+        return Harmonics::default();
+    }
+    let order = params.order.min(BOUNDARY_ORDER);
+    let columns = lit.directions.len();
+    let batch = Batch { basis: basis.bands(order), lobe: None };
+    let places = coefficient_places(order);
+    let rows: Vec<Vec<f32>> = lit
+        .boundary
+        .par_chunks(BATCH * columns)
+        .zip(lit.transmittance.par_chunks(BATCH * columns))
+        .map(|(through, psi)| {
+            let shape = (through.len() / columns, columns);
+            let weight = Array2::from_shape_fn(shape, |(q, d)| psi[q * columns + d] + 0.02);
+            let right = Array2::from_shape_fn(shape, |(q, d)| through[q * columns + d] * weight[[q, d]]);
+            let x = batch.linear(&weight, &right, &vec![1e-4; shape.0]);
+            x.rows().into_iter().flat_map(|x| in_order(&places, x.iter())).collect()
+        })
+        .collect();
+    let mut out = Coefficients::zeros(vec![order as u8; lit.samples.len()]);
+    out.values = rows.concat();
+    out.quantised()
+}
