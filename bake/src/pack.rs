@@ -38,7 +38,10 @@ pub(crate) fn pack(
         .iter()
         .enumerate()
         .map(|(i, s)| {
-            let [x, y, z] = ((lit.cells.centroid(i) - s.position) * (127.0 / s.radius)).round().clamp(LEAST, MOST).to_array();
+            let [x, y, z] = ((lit.cells.centroid(i) - s.position) * (127.0 / s.radius))
+                .round()
+                .clamp(LEAST, MOST)
+                .to_array();
             [x as i8, y as i8, z as i8, 0]
         })
         .collect();

@@ -113,7 +113,7 @@ struct Clipped {
 }
 
 /// Parts of a kernel's support where the density varies: each has its own mean density and attenuation.
-pub const PARTS: usize = 3;
+pub const PARTS: usize = 4;
 
 impl Clipped {
     /// Equal parts of every support, the nearest first.
@@ -220,16 +220,23 @@ impl Hits {
     }
 }
 
-/// The medium over each lane's support, at unit κ: depth in front, mean density, mean scattering density.
+/// The medium over each lane's support, at unit κ: depth in front, mean density, mean scattering density and its place.
 struct Path {
     before: Lanes,
     density: Lanes,
     scattering: Lanes,
+    /// From each support's middle to the mean place where it scatters, as far as the density alone says.
+    shift: Lanes,
 }
 
 impl Path {
     fn new(along: &Along, clipped: &Clipped, start: f32) -> Self {
-        let mut path = Self { before: [0.0; LANES], density: [1.0; LANES], scattering: [1.0; LANES] };
+        let mut path = Self {
+            before: [0.0; LANES],
+            density: [1.0; LANES],
+            scattering: [1.0; LANES],
+            shift: [0.0; LANES],
+        };
         match along {
             Along::Uniform(_) => {
                 for k in 0..LANES {
@@ -244,7 +251,13 @@ impl Path {
                         let inverse = 1.0 / clipped.length[k];
                         path.before[k] = first[0];
                         path.density[k] = (last[0] - first[0]) * inverse;
-                        path.scattering[k] = (last[1] - first[1]) * inverse;
+                        let mass = last[1] - first[1];
+                        path.scattering[k] = mass * inverse;
+                        if mass > 0.0 {
+                            let half = 0.5 * clipped.length[k];
+                            let middle = from + half - start;
+                            path.shift[k] = ((last[2] - first[2]) / mass - middle).clamp(-half, half);
+                        }
                     }
                 }
             }
@@ -252,7 +265,8 @@ impl Path {
         path
     }
 
-    /// W_i of every lane for the extinction `kappa` of one channel, and the mean of t - tc under it.
+    /// W_i of every lane for the extinction `kappa` of one channel, and the mean of t - tc under it. The closed form takes
+    /// the density as even over the support; what is uneven moves the mean.
     fn weights(&self, kappa: f32, chunk: &Chunk, clipped: &Clipped, piece: f32) -> (Lanes, Lanes) {
         let (mut mild, mut long) = (true, true);
         for k in 0..LANES {
@@ -289,6 +303,12 @@ impl Path {
                     g,
                 );
             }
+        }
+        for k in 0..LANES {
+            let low = clipped.from[k] - chunk.tc[k];
+            let moved = mean[k] + self.shift[k];
+            let moved = if moved > low { moved } else { low };
+            mean[k] = if moved < low + clipped.length[k] { moved } else { low + clipped.length[k] };
         }
         (out, mean)
     }

@@ -6,8 +6,10 @@
 //!
 //! A constant source comes out exactly. Within a kernel the source varies as its [`Source`] says; v_i above is its
 //! mean under the kernel's weight (see [`crate::hits`]). In a homogeneous medium W_i is the closed form of [`crate::kernel`] and
-//! A = 1 - e^{-κ(t1-t0)}. Otherwise a [`Profile`] of the density along the piece supplies τ at the ends of three
-//! equal parts of the kernel's support; in each part τ is taken as linear, and σ is its mean scattering density.
+//! A = 1 - e^{-κ(t1-t0)}. Otherwise a [`Profile`] of the density along the piece supplies τ at the ends of four
+//! equal parts of the kernel's support; in each part τ is taken as linear, σ is its mean scattering density, and v is
+//! taken where the part scatters in the mean (measured on the layered cube at 20,000 samples, exact light: error and bias
+//! 0.0379 and 0.65 % with three parts and no shift of the mean, 0.0356 and 0.26 % so; eight parts alone 0.0353 and 0.17 %).
 //! (The thesis sums v_i ∫γ_i dt alone, equation 3.4.)
 
 use crate::asset::{DensityGrid, Samples};
@@ -112,6 +114,8 @@ pub struct Profile {
     pub density: [f32; PROFILE_CELLS + 1],
     /// ∫ of the scattering part of ρ.
     pub scattering: [f32; PROFILE_CELLS + 1],
+    /// ∫ of the same times the distance from the piece's start.
+    pub moment: [f32; PROFILE_CELLS + 1],
 }
 
 impl Profile {
@@ -120,29 +124,39 @@ impl Profile {
         const SUBSTEPS: usize = 2;
         let cell = (end - start) / PROFILE_CELLS as f32;
         let h = cell / SUBSTEPS as f32;
-        let mut profile =
-            Self { start, cell, density: [0.0; PROFILE_CELLS + 1], scattering: [0.0; PROFILE_CELLS + 1] };
-        let mut sum = [0.0f32; 2];
+        let mut profile = Self {
+            start,
+            cell,
+            density: [0.0; PROFILE_CELLS + 1],
+            scattering: [0.0; PROFILE_CELLS + 1],
+            moment: [0.0; PROFILE_CELLS + 1],
+        };
+        let mut sum = [0.0f32; 3];
         for k in 0..PROFILE_CELLS {
             for s in 0..SUBSTEPS {
-                let t = start + (k as f32 * SUBSTEPS as f32 + s as f32 + 0.5) * h;
-                let value = grid.value(origin + direction * t);
+                let along = (k as f32 * SUBSTEPS as f32 + s as f32 + 0.5) * h;
+                let value = grid.value(origin + direction * (start + along));
                 sum[0] += value[0] * h;
                 sum[1] += value[1] * h;
+                sum[2] += value[1] * h * along;
             }
             profile.density[k + 1] = sum[0];
             profile.scattering[k + 1] = sum[1];
+            profile.moment[k + 1] = sum[2];
         }
         profile
     }
 
-    /// [∫ρ, ∫scattering ρ] from the piece's start to `t`, linear between the points.
-    pub fn at(&self, t: f32) -> [f32; 2] {
+    /// [∫ρ, ∫scattering ρ, ∫scattering ρ · distance from the piece's start] from the piece's start to `t`; ρ is taken as
+    /// even between the points.
+    pub fn at(&self, t: f32) -> [f32; 3] {
         let s = ((t - self.start) / self.cell).clamp(0.0, PROFILE_CELLS as f32);
         let i = (s as usize).min(PROFILE_CELLS - 1);
         let f = s - i as f32;
         let lerp = |v: &[f32; PROFILE_CELLS + 1]| v[i] + (v[i + 1] - v[i]) * f;
-        [lerp(&self.density), lerp(&self.scattering)]
+        let mass = self.scattering[i + 1] - self.scattering[i];
+        let moment = lerp(&self.moment) - 0.5 * mass * f * (1.0 - f) * self.cell;
+        [lerp(&self.density), lerp(&self.scattering), moment]
     }
 }
 
@@ -283,19 +297,22 @@ mod tests {
             };
             let size = (to - from) / parts as f32;
             for (from, to) in (0..parts).map(|p| (from + size * p as f32, from + size * (p + 1) as f32)) {
-                let (before, density, scattering) = match along {
-                    Along::Uniform(_) => (from - start, 1.0, 1.0),
+                let (before, density, scattering, shift) = match along {
+                    Along::Uniform(_) => (from - start, 1.0, 1.0, 0.0),
                     Along::Profile(_, p) => {
                         let (first, last) = (p.at(from), p.at(to));
                         let [slope, scattering] = [0, 1].map(|c| (last[c] - first[c]) / (to - from));
-                        (first[0], slope, scattering)
+                        let place = (last[2] - first[2]) / (last[1] - first[1]) + start;
+                        let shift = if scattering > 0.0 { place - 0.5 * (from + to) } else { 0.0 };
+                        (first[0], slope, scattering, shift)
                     }
                 };
                 for c in 0..3 {
                     let k = kappa[c] * density;
                     let g = kernel::integral(a, d2, tc, k, from, to);
                     let w = cloud.weight[i] * scattering * (-kappa[c] * before).exp() * g;
-                    let mean = kernel::mean_offset(a, d2, tc, k, from, to, g);
+                    let mean = kernel::mean_offset(a, d2, tc, k, from, to, g) + shift;
+                    let mean = mean.clamp(from - tc, to - tc);
                     let slope = source[i].slope[c];
                     let along_ray = slope.dot(direction);
                     let variance = (0.5 / (a * a)).min((to - from).powi(2) / 12.0);

@@ -1,7 +1,7 @@
 //! Light that arrives at the samples as it is: means over their cells, no harmonics.
 
-use crate::fit::Lit;
 use crate::field::Shape;
+use crate::fit::Lit;
 use crate::progress::Stage;
 use crate::{Prepared, Result};
 use diaphane_formats::visibility::project_with;

@@ -178,12 +178,7 @@ impl<'a> Stored<'a> {
         let (direction, basis) = &self.basis[k];
         let dot = |values: &[f32]| values.iter().zip(basis).map(|(c, y)| c * y).sum::<f32>();
         let through = if self.boundary.is_empty() { 1.0 } else { dot(self.boundary.of(i)).clamp(0.0, 1.0) };
-        let lobe = self
-            .asset
-            .samples
-            .lobe
-            .get(i)
-            .map_or(0.0, |a| a.dot(*direction).max(0.0));
+        let lobe = self.asset.samples.lobe.get(i).map_or(0.0, |a| a.dot(*direction).max(0.0));
         let tau = self.asset.info.encoding.decode(dot(self.depth.of(i)) + lobe);
         if tau == f32::INFINITY { 0.0 } else { (-self.ratio[channel] * tau).exp() * through }
     }

@@ -125,5 +125,7 @@ fn as_scattering(medium: &Medium, found: &[DVec3], size: usize) -> Vec<DVec3> {
 fn in_ball(seed: u64) -> impl Iterator<Item = DVec3> {
     let unit = |k: u64| hash(seed, k) as f64 / 2f64.powi(64);
     let shift = DVec3::new(unit(0), unit(1), unit(2));
-    (0..).map(move |k| (shift + STEPS * f64::from(k)).fract() * 2.0 - 1.0).filter(|p| p.length_squared() < 1.0)
+    (0..)
+        .map(move |k| (shift + STEPS * f64::from(k)).fract() * 2.0 - 1.0)
+        .filter(|p| p.length_squared() < 1.0)
 }

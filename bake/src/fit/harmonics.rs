@@ -84,7 +84,8 @@ fn encoding(lit: &Lit, basis: &Basis, params: &Params) -> Encoding {
         Representation::Reciprocal => Encoding::Reciprocal { epsilon },
         Representation::Lobe => Encoding::Lobe { epsilon },
     };
-    let trial: Vec<usize> = (0..lit.samples.len()).step_by(lit.samples.len().div_ceil(TRIAL).max(1)).collect();
+    let trial: Vec<usize> =
+        (0..lit.samples.len()).step_by(lit.samples.len().div_ceil(TRIAL).max(1)).collect();
     let error = |epsilon: &f32| -> f64 {
         let fitter = Fitter { lit, basis, encoding: with(*epsilon), params };
         let batch = |group: &[usize]| -> f64 {
@@ -202,9 +203,8 @@ impl Fitter<'_> {
     fn with_lobe(&self, samples: &[usize], order: usize) -> Vec<Fitted> {
         let psi = self.rows(samples);
         let axis = |q: usize| self.lit.surface[samples[q]];
-        let lobe = Array2::from_shape_fn(psi.dim(), |(q, d)| {
-            axis(q).dot(self.lit.directions[d].as_vec3()).max(0.0)
-        });
+        let lobe =
+            Array2::from_shape_fn(psi.dim(), |(q, d)| axis(q).dot(self.lit.directions[d].as_vec3()).max(0.0));
         let batch = Batch { basis: self.basis.bands(order), lobe: Some(&lobe) };
         let places = coefficient_places(order);
         let mut x = batch.start(self.encoding, &psi);

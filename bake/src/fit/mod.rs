@@ -7,7 +7,7 @@ mod harmonics;
 mod least_squares;
 mod weights;
 
-pub(crate) use depths::{Lit, depths};
 pub(crate) use boundary::boundary_order;
+pub(crate) use depths::{Lit, depths};
 pub(crate) use harmonics::{Light, harmonics};
 pub(crate) use weights::weights;

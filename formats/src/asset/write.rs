@@ -24,9 +24,8 @@ pub fn encode(asset: &Asset) -> Result<Vec<u8>> {
     };
     let lobes: Vec<u32> = s.lobe.iter().map(|a| lobe::code(*a)).collect();
     let mark = |i: usize| if lobes.get(i).is_some_and(|code| *code != 0) { HAS_LOBE } else { 0 };
-    let offset = |(i, (o, order)): (usize, (&[i8; 4], &u8))| {
-        [o[0] as u8, o[1] as u8, o[2] as u8, *order | mark(i)]
-    };
+    let offset =
+        |(i, (o, order)): (usize, (&[i8; 4], &u8))| [o[0] as u8, o[1] as u8, o[2] as u8, *order | mark(i)];
     let weight: Vec<f16> = s.weight.iter().map(|w| f16::from_f32(*w)).collect();
     let mut sections = vec![
         (Kind::Info, codec::encode(&asset.info)?),

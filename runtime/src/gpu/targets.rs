@@ -24,7 +24,7 @@ const CROSSINGS: u64 = 40;
 const BOUNDARY: u64 = 48;
 const PIECE: u64 = 16;
 const CELL: u64 = 8;
-const PROFILE: u64 = 8 * (PROFILE_CELLS as u64 + 1);
+const PROFILE: u64 = 16 * (PROFILE_CELLS as u64 + 1);
 
 /// Buffers and textures for a tile of a given number of columns and rows.
 pub(super) struct Targets {

@@ -3,7 +3,7 @@
 const SUBSTEPS: u32 = 2u;
 
 @group(1) @binding(0) var<storage, read> piece: array<vec4f>;
-@group(1) @binding(1) var<storage, read_write> profile: array<vec2f>;
+@group(1) @binding(1) var<storage, read_write> profile: array<vec4f>;
 @group(1) @binding(2) var<storage, read> grid: array<u32>; // two 16-bit floats: density, its scattering part
 
 fn voxel(x: u32, y: u32, z: u32) -> vec2f {
@@ -41,13 +41,14 @@ fn march(@builtin(global_invocation_id) pixel: vec3u) {
     let direction = ray_direction(pixel.xy);
     let h = (ends.y - ends.x) / f32(PROFILE_CELLS) / f32(SUBSTEPS);
     let stride = profile_stride();
-    var sum = vec2f(0.0);
-    profile[index] = sum;
+    var sum = vec3f(0.0);
+    profile[index] = vec4f(0.0);
     for (var k = 0u; k < PROFILE_CELLS; k++) {
         for (var s = 0u; s < SUBSTEPS; s++) {
-            let t = ends.x + (f32(k * SUBSTEPS + s) + 0.5) * h;
-            sum += density(view.origin + direction * t) * h;
+            let along = (f32(k * SUBSTEPS + s) + 0.5) * h;
+            let value = density(view.origin + direction * (ends.x + along)) * h;
+            sum += vec3f(value, value.y * along);
         }
-        profile[(k + 1u) * stride + index] = sum;
+        profile[(k + 1u) * stride + index] = vec4f(sum, 0.0);
     }
 }

@@ -3,7 +3,7 @@
 override HETEROGENEOUS: bool = false;
 
 @group(1) @binding(0) var<storage, read> piece: array<vec4f>;
-@group(1) @binding(1) var<storage, read> profile: array<vec2f>;
+@group(1) @binding(1) var<storage, read> profile: array<vec4f>;
 @group(1) @binding(2) var<storage, read_write> front: array<vec4f>;
 @group(1) @binding(3) var<storage, read_write> radiance: array<vec4f>;
 @group(1) @binding(4) var<storage, read_write> counters: array<vec4u>;

@@ -6,13 +6,13 @@ override HETEROGENEOUS: bool = false;   // the medium has a density profile
 @group(1) @binding(0) var<storage, read> samples: array<vec4f>; // position, sharpness
 @group(1) @binding(1) var<storage, read> sources: array<vec4f>; // SOURCE a sample: v, weight; slopes
 @group(1) @binding(2) var<storage, read> piece: array<vec4f>;
-@group(1) @binding(3) var<storage, read> profile: array<vec2f>;
+@group(1) @binding(3) var<storage, read> profile: array<vec4f>;
 // Least start and greatest end of the current piece over 8 x 8 pixels: kernels that no ray meets draw nothing.
 @group(1) @binding(4) var<storage, read> cells: array<vec2f>;
 
 const SOURCE: u32 = 4u;
 const MOST_EXPONENT: f32 = 4.0;
-const PARTS: u32 = 3u;
+const PARTS: u32 = 4u;
 const CELL: u32 = 8u;
 const MOST_CELLS: u32 = 64u;
 
@@ -152,14 +152,20 @@ fn add(in: Splat) -> Sums {
     for (var part = 0u; part < parts; part++) {
         let near = ends.x + f32(part) * size;
         var path = Path(near - tc, size, near - whole.x, 1.0, 1.0);
+        var shift = 0.0;
         if (HETEROGENEOUS) {
             // Attenuation in front from the profile; inside the part it is taken as linear.
             let first = profile_at(index, near - whole.x, whole.y - whole.x);
             let last = profile_at(index, near + size - whole.x, whole.y - whole.x);
-            let change = (last - first) * (1.0 / size);
+            let change = last - first;
             path.before = first.x;
-            path.density = change.x;
-            path.scattering = change.y;
+            path.density = change.x * (1.0 / size);
+            path.scattering = change.y * (1.0 / size);
+            // The closed form takes the density as even over the part; what is uneven moves the mean.
+            if (change.y > 0.0) {
+                let middle = near + 0.5 * size - whole.x;
+                shift = clamp(change.z / change.y - middle, -0.5 * size, 0.5 * size);
+            }
         }
         let red = kernel_weight(a, d2, path, medium.kappa.x, long);
         var w = vec3f(red.x);
@@ -170,6 +176,7 @@ fn add(in: Splat) -> Sums {
             w = vec3f(red.x, green.x, blue.x);
             mean = vec3f(red.y, green.y, blue.y);
         }
+        mean = clamp(mean + shift, vec3f(path.s), vec3f(path.s + size));
         w *= in.source.w;
         // The source's mean under the weight: it grows exponentially from the kernel's centre.
         let spread = min(0.25 / (a * a), size * size * (1.0 / 24.0));

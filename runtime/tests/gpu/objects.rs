@@ -5,6 +5,7 @@ use diaphane_formats::directions::{even_directions, hash};
 use diaphane_formats::encoding::Encoding;
 use diaphane_formats::fresnel;
 use diaphane_formats::harmonics::Coefficients;
+use diaphane_formats::lobe;
 use diaphane_formats::mesh::MeshReport;
 use diaphane_formats::phase::Phase;
 use diaphane_formats::sh;
