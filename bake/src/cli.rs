@@ -70,6 +70,9 @@ struct BakeArguments {
     /// Error of a sample's transmittance below which it gets no more bands (0: every sample gets all).
     #[arg(long, value_name = "E")]
     light_error: Option<f64>,
+    /// Most times that all samples are moved and resized to lower the error of rays (0: never).
+    #[arg(long, value_name = "ROUNDS")]
+    refine: Option<usize>,
     /// What the harmonics represent.
     #[arg(long, value_enum, default_value_t = EncodingName::Lobe)]
     encoding: EncodingName,
@@ -97,9 +100,9 @@ struct BakeArguments {
 enum PresetName {
     /// 5,000 samples, 96 directions, at most 6 bands.
     Draft,
-    /// 50,000 samples, 512 directions, at most 10 bands.
+    /// 50,000 samples, 768 directions, at most 10 bands.
     Standard,
-    /// 50,000 samples, 512 directions, at most 14 bands.
+    /// 50,000 samples, refined, 1,536 directions, at most 14 bands.
     Fine,
 }
 
@@ -127,6 +130,7 @@ impl BakeArguments {
         params.points_per_sample = self.points.unwrap_or(params.points_per_sample);
         params.order = self.sh_order.unwrap_or(params.order);
         params.light_error = self.light_error.unwrap_or(params.light_error);
+        params.refine = self.refine.unwrap_or(params.refine);
         params.seed = self.seed.unwrap_or(params.seed);
         params.certificate = !self.no_certificate;
         params.max_error = self.max_error;

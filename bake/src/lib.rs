@@ -1,7 +1,7 @@
 //! Bakes a translucent mesh: thesis chapter 3, algorithms 1 and 2.
 //!
 //! ```text
-//! mesh ─ field ─ layers ─ density ─ samples ─ fit (optical depth, harmonics, weights) ─ pack ─ certificate ─ asset
+//! mesh ─ field ─ layers ─ density ─ samples ─ (refine) ─ fit (optical depth, harmonics, weights) ─ pack ─ certificate ─ asset
 //! ```
 //!
 //! A stage imports only the stages before it. Nothing here prints; progress and cancellation go through
@@ -13,9 +13,11 @@ mod error;
 mod field;
 mod fit;
 mod layers;
+mod measure;
 mod pack;
 pub mod params;
 pub mod progress;
+mod refine;
 pub mod report;
 mod samples;
 
@@ -25,6 +27,7 @@ use certificate::Goal;
 use diaphane_formats::asset::Asset;
 use diaphane_formats::medium::{Density, Medium, SampledDensity};
 use diaphane_formats::mesh::{Mesh, MeshReport};
+use pack::Stand;
 use params::Params;
 use progress::{Progress, Timed};
 use report::Report;
@@ -89,18 +92,31 @@ fn bake_once(input: &Input<'_>, params: &Params, timed: &mut Timed<'_>) -> Resul
     let medium = timed.stage("medium", |_| Ok(Prepared::new(input.medium, input.mesh)))?;
     let layers = timed.stage("layers", |p| layers::build(&shape, input.medium, p))?;
     let density = timed.stage("density", |p| density::evaluate(&shape, &layers, &medium, params, p))?;
-    let placed =
-        timed.stage("samples", |p| samples::place(&shape, &layers, &density, input.medium, params, p))?;
+    let (offered, placed) = timed.stage("samples", |p| {
+        let offered = samples::offer(&shape, &layers, &density, input.medium, params)?;
+        let placed = samples::place(&shape, &offered, params.samples, |_| 1.0, p)?;
+        Ok((offered, placed))
+    })?;
+    let bench = refine::Bench { input, shape: &shape, medium: &medium, offered: &offered, params };
+    let (placed, width_factor, refined) = match params.refine {
+        0 => (placed, params.width_factor, None),
+        rounds => timed.stage("refinement", |p| refine::refine(&bench, placed, rounds, p))?,
+    };
+    let params = &Params { width_factor, ..params.clone() };
     let lit = timed.stage("optical depth", |p| fit::depths(&shape, &medium, placed, params, p))?;
     let harmonics = timed.stage("harmonics", |p| fit::harmonics(&lit, params, p))?;
-    let weights = timed.stage("weights", |p| fit::weights(&lit, params, p))?;
-    let mut asset = timed
-        .stage("packing", |_| pack::pack(input, medium.sampled.as_ref(), params, &lit, harmonics, weights))?;
+    let weights = timed.stage("weights", |p| fit::weights(&lit.samples, &lit.probes, width_factor, p))?;
+    let stand = Stand { samples: &lit.samples, cells: &lit.cells, discarded: lit.discarded };
+    let mut asset = timed.stage("packing", |_| {
+        pack::pack(input, medium.sampled.as_ref(), params, &stand, harmonics, weights)
+    })?;
     if params.certificate {
-        let measured = timed
-            .stage("certificate", |p| certificate::measure(&shape, &medium, &lit, &asset, params.seed, p))?;
+        let measured = timed.stage("certificate", |p| {
+            certificate::measure(&shape, &medium, &lit.cells, &asset, params.seed, p)
+        })?;
         asset.info.certificate = Some(measured);
     }
-    let report = Report::new(params, &shape, &layers, &lit, &asset, &timed.seconds);
+    let report =
+        Report { refinement: refined, ..Report::new(params, &shape, &layers, &lit, &asset, &timed.seconds) };
     Ok((asset, report))
 }

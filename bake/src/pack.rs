@@ -1,7 +1,8 @@
 //! Everything into one asset.
 
-use crate::fit::{Light, Lit, boundary_order};
+use crate::fit::{Cells, Light, boundary_order};
 use crate::params::Params;
+use crate::samples::Candidate;
 use crate::{Input, Result};
 use diaphane_formats::asset::{Asset, DensityGrid, Info, Provenance, Samples};
 use diaphane_formats::medium::{Density, Medium, SampledDensity};
@@ -13,11 +14,19 @@ use half::f16;
 const LEAST: DVec3 = DVec3::splat(-127.0);
 const MOST: DVec3 = DVec3::splat(127.0);
 
+/// Where the samples stand.
+pub(crate) struct Stand<'a> {
+    pub samples: &'a [Candidate],
+    pub cells: &'a Cells,
+    /// Samples that were dropped.
+    pub discarded: usize,
+}
+
 pub(crate) fn pack(
     input: &Input<'_>,
     sampled: Option<&SampledDensity>,
     params: &Params,
-    lit: &Lit,
+    placed: &Stand<'_>,
     light: Light,
     weight: Vec<f32>,
 ) -> Result<Asset> {
@@ -25,7 +34,7 @@ pub(crate) fn pack(
     let centre = 0.5 * (low + high);
     let local = |p: DVec3| (p - centre).as_vec3().to_array();
     let medium = input.medium;
-    let position_radius = lit
+    let position_radius = placed
         .samples
         .iter()
         .map(|s| {
@@ -33,12 +42,12 @@ pub(crate) fn pack(
             [x, y, z, s.radius as f32]
         })
         .collect();
-    let offset = lit
+    let offset = placed
         .samples
         .iter()
         .enumerate()
         .map(|(i, s)| {
-            let [x, y, z] = ((lit.cells.centroid(i) - s.position) * (127.0 / s.radius))
+            let [x, y, z] = ((placed.cells.centroid(i) - s.position) * (127.0 / s.radius))
                 .round()
                 .clamp(LEAST, MOST)
                 .to_array();
@@ -62,8 +71,8 @@ pub(crate) fn pack(
         phase: medium.phase(),
         ior: medium.ior(),
         uniform_density: medium.uniform_density(),
-        samples: lit.samples.len() as u64,
-        discarded: lit.discarded as u64,
+        samples: placed.samples.len() as u64,
+        discarded: placed.discarded as u64,
         order: params.order as u32,
         light_error: params.light_error,
         boundary_order: boundary_order(medium.ior(), params.order) as u32,

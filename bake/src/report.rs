@@ -8,6 +8,19 @@ use diaphane_formats::asset::{Asset, Certificate, encode};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
+/// What refinement did: relative errors of ray integrals with exact light, on rays and lights of its own.
+#[derive(Clone, Debug, Serialize)]
+pub struct Refinement {
+    /// Before.
+    pub before: f64,
+    /// After.
+    pub after: f64,
+    /// Times that all samples were placed anew, the last of which may have been taken back.
+    pub moves: usize,
+    /// Width of the kernels that was found, in disk radii.
+    pub width_factor: f32,
+}
+
 /// The report of one bake.
 #[derive(Clone, Debug, Serialize)]
 pub struct Report {
@@ -35,6 +48,8 @@ pub struct Report {
     pub skipped: BTreeMap<String, usize>,
     /// What was mended in the mesh, in sentences.
     pub warnings: Vec<String>,
+    /// What refinement did; `None` where it was not asked for.
+    pub refinement: Option<Refinement>,
     /// How far the asset is from the truth; `None` if it was not measured.
     pub certificate: Option<Certificate>,
     /// What the bake could not do as asked, in sentences.
@@ -76,6 +91,7 @@ impl Report {
             snapped: lit.snapped,
             layers: layers.len(),
             skipped,
+            refinement: None,
             certificate: asset.info.certificate,
             shortfalls,
             warnings: asset.info.provenance.mesh_report.warnings(),

@@ -1,34 +1,25 @@
 //! The error certificate: an asset measured on rays and lights that no fit has seen.
 //!
-//! ```text
-//! views (rays) ─┬─ truth (quadrature, exact light) ─┐
-//!               └─ play (the packed samples) ───────┴─ pool ─ certificate
-//! cells ─ exact ─┘
-//! ```
-//!
 //! Each pair of a view and lights is a small picture. The share of interpolation comes from playing some of the lights
 //! without harmonics: the exact mean of the transmittance over each sample's cell takes their place.
 
-mod exact;
 mod goal;
-mod play;
 mod pool;
-mod truth;
-mod views;
 
 pub(crate) use goal::Goal;
 
 use crate::field::Shape;
-use crate::fit::Lit;
+use crate::fit::Cells;
+use crate::measure::play::{Player, Stored};
+use crate::measure::truth::Nodes;
+use crate::measure::{exact, views};
 use crate::progress::Stage;
 use crate::{Prepared, Result};
 use diaphane_formats::asset::{self, Asset, Certificate, CertifiedError};
 use diaphane_formats::directions::{even_directions, hash};
 use diaphane_formats::slopes::means_share;
 use glam::Vec3;
-use play::{Player, Stored};
 use pool::Pictures;
-use truth::Nodes;
 
 /// Directions of view.
 const VIEWS: usize = 16;
@@ -41,7 +32,7 @@ const EXACT: [usize; 6] = [0, 4, 8, 9, 13, 17];
 pub(crate) fn measure(
     shape: &Shape<'_>,
     medium: &Prepared<'_>,
-    lit: &Lit,
+    cells: &Cells,
     packed: &Asset,
     seed: u64,
     stage: Stage<'_>,
@@ -63,7 +54,7 @@ pub(crate) fn measure(
     let pictures =
         Pictures { views: &views, lights: &lights, phase: asset.info.phase, truth: &truth, played: &played };
 
-    let exact = exact::means(shape, medium, lit, EXACT.map(|l| (lights[l], l % 3)), stage)?;
+    let exact = exact::means(shape, medium, cells, &EXACT.map(|l| (lights[l], l % 3)), stage)?;
     let played = player.radiance(EXACT.len(), |i, l| exact[l][i], Vec3::ONE, stage)?;
     let exact_lights = EXACT.map(|l| lights[l]);
     let exact_truth = EXACT.map(|l| truth[l].clone());

@@ -4,10 +4,10 @@
 //! (One light alone, often from behind, overrates what a user sees; three underrate it. Measured against pictures of
 //! the reference, pairs came closest.) The player's sum over two lights is taken as the sum of its pictures, from which
 //! it differs only by how slopes mix. All squares are pooled: rel_rmse² = Σ(I-R)² / ΣR², with the unbiased products of
-//! [`super::truth`] in place of the squares and equal weight for every picture.
+//! [`crate::measure::truth`] in place of the squares and equal weight for every picture.
 
-use super::truth::Radiance;
-use super::views::View;
+use crate::measure::truth::Radiance;
+use crate::measure::views::View;
 use diaphane_formats::phase::Phase;
 use glam::DVec3;
 

@@ -8,6 +8,7 @@ mod least_squares;
 mod weights;
 
 pub(crate) use boundary::boundary_order;
+pub(crate) use cells::Cells;
 pub(crate) use depths::{Lit, depths};
 pub(crate) use harmonics::{Light, harmonics};
 pub(crate) use weights::weights;

@@ -3,10 +3,9 @@
 //! Non-negative least squares Σ_i w_i γ_i(x) = 1 over random inside points, weighted by √Φ, by multiplicative updates
 //! w_i ← w_i (AᵀWb)_i / (AᵀWAw)_i (Lee and Seung 2001), which keep every weight positive.
 
-use super::depths::Lit;
 use crate::Result;
-use crate::params::Params;
 use crate::progress::Stage;
+use crate::samples::Candidate;
 use diaphane_formats::kernel;
 use diaphane_formats::reconstruct::Cloud;
 use glam::Vec3;
@@ -66,18 +65,22 @@ impl Rows {
     }
 }
 
-pub(crate) fn weights(lit: &Lit, params: &Params, stage: Stage<'_>) -> Result<Vec<f32>> {
+pub(crate) fn weights(
+    samples: &[Candidate],
+    probes: &[Candidate],
+    width_factor: f32,
+    stage: Stage<'_>,
+) -> Result<Vec<f32>> {
     stage.announce(ITERATIONS);
-    let origin = lit.samples.first().map_or(glam::DVec3::ZERO, |s| s.position);
+    let origin = samples.first().map_or(glam::DVec3::ZERO, |s| s.position);
     let local = |p: glam::DVec3| (p - origin).as_vec3();
-    let centre: Vec<Vec3> = lit.samples.iter().map(|s| local(s.position)).collect();
+    let centre: Vec<Vec3> = samples.iter().map(|s| local(s.position)).collect();
     let sharpness: Vec<f32> =
-        lit.samples.iter().map(|s| kernel::sharpness(s.radius as f32, params.width_factor)).collect();
+        samples.iter().map(|s| kernel::sharpness(s.radius as f32, width_factor)).collect();
     let n = centre.len();
     let cloud = Cloud::from_parts(centre, sharpness, vec![1.0; n]);
     // Each row of the system is a probe, scaled by the fourth root of its fluence (√Φ in the squared error).
-    let lists: Vec<Vec<(u32, f32)>> = lit
-        .probes
+    let lists: Vec<Vec<(u32, f32)>> = probes
         .par_iter()
         .map(|probe| {
             let p = local(probe.position);
@@ -92,7 +95,7 @@ pub(crate) fn weights(lit: &Lit, params: &Params, stage: Stage<'_>) -> Result<Ve
             row
         })
         .collect();
-    let importance: Vec<f32> = lit.probes.iter().map(|p| p.fluence.max(1e-6).sqrt() as f32).collect();
+    let importance: Vec<f32> = probes.iter().map(|p| p.fluence.max(1e-6).sqrt() as f32).collect();
     let by_probe = Rows::new(lists);
     let by_sample = by_probe.transposed(n);
     let wanted = by_sample.times(&importance);

@@ -1,11 +1,11 @@
 //! Candidates on the layers and in the slabs beneath them.
 
 use super::Candidate;
-use crate::Result;
 use crate::density::LayerFluence;
 use crate::field::{Shape, inside_nodes};
 use crate::layers::Layer;
 use crate::params::{DARK, Params, RADIUS_EXPONENT};
+use crate::{Error, Result};
 use diaphane_formats::directions::hash;
 use diaphane_formats::medium::Medium;
 use glam::DVec3;
@@ -22,7 +22,8 @@ const ENOUGH: usize = 10;
 /// Draws at the most.
 const ROUNDS: u64 = 8;
 
-pub(super) struct Drawn {
+/// Where samples may be.
+pub(crate) struct Offered {
     /// On the boundary: offered before all others, so that the layer where light enters and leaves has no gaps.
     pub surface: Vec<Candidate>,
     pub list: Vec<Candidate>,
@@ -38,13 +39,13 @@ struct Patch {
     demand: f64,
 }
 
-pub(super) fn draw(
+pub(crate) fn offer(
     shape: &Shape<'_>,
     layers: &[Layer],
     fluence: &LayerFluence,
     medium: &Medium,
     params: &Params,
-) -> Result<Drawn> {
+) -> Result<Offered> {
     let patches = patches(layers, fluence, medium);
     let mean = reference_demand(&patches);
     let relative_radius = |demand: f64| (demand / mean).max(1e-12).powf(-RADIUS_EXPONENT).clamp(0.5, 2.0);
@@ -56,7 +57,7 @@ pub(super) fn draw(
         cumulative.push(total);
     }
     if !(total > 0.0) {
-        return Ok(Drawn { surface: Vec::new(), list: Vec::new(), dark: 0 });
+        return Err(no_room());
     }
     let wanted = OVERSAMPLING * params.samples + 64;
     let one = |seed: u64, i: usize| {
@@ -99,10 +100,13 @@ pub(super) fn draw(
     let mut order: Vec<(u64, Candidate)> =
         list.iter().enumerate().map(|(i, c)| (hash(hash(params.seed, 29), i as u64), *c)).collect();
     order.sort_unstable_by_key(|(key, _)| *key);
+    if list.is_empty() {
+        return Err(no_room());
+    }
     let fill = usable(shape, medium, &fill(shape, &list, layers))?;
     let surface =
         usable(shape, medium, &surface(shape, layers, fluence, medium, &relative_radius, params.seed))?;
-    Ok(Drawn { surface, list: order.into_iter().map(|(_, c)| c).chain(fill).collect(), dark })
+    Ok(Offered { surface, list: order.into_iter().map(|(_, c)| c).chain(fill).collect(), dark })
 }
 
 /// Candidates on the boundary: on the first layer in proportion to 1/radius², moved onto the mesh.
@@ -175,6 +179,10 @@ fn reference_demand(patches: &[Patch]) -> f64 {
     let volume: f64 = patches.iter().map(|p| p.volume).sum();
     let sum: f64 = patches.iter().map(|p| p.volume * p.demand.max(1e-12).ln()).sum();
     if volume > 0.0 { (sum / volume).exp() } else { 1.0 }
+}
+
+fn no_room() -> Error {
+    Error::NoRoom("no light reaches its inside, or nothing there scatters".to_owned())
 }
 
 fn barycentric(u: f64, v: f64) -> [f64; 3] {

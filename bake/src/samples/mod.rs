@@ -9,14 +9,13 @@
 mod candidates;
 mod darts;
 
-use crate::density::LayerFluence;
+pub(crate) use candidates::{Offered, offer};
+
+use crate::Result;
 use crate::field::Shape;
-use crate::layers::Layer;
-use crate::params::{BOUNDARY_SNAP, Params};
+use crate::params::BOUNDARY_SNAP;
 use crate::progress::Stage;
-use crate::{Error, Result};
 use diaphane_formats::asset::Places;
-use diaphane_formats::medium::Medium;
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -44,25 +43,22 @@ pub(crate) struct Placed {
 /// Inside points for each sample when weights are fitted.
 const PROBES_PER_SAMPLE: usize = 8;
 
+/// Places about `wanted` samples. `factor` scales the radius that the light asks for at a point.
 pub(crate) fn place(
     shape: &Shape<'_>,
-    layers: &[Layer],
-    fluence: &LayerFluence,
-    medium: &Medium,
-    params: &Params,
+    offered: &Offered,
+    wanted: usize,
+    factor: impl Fn(DVec3) -> f64 + Sync,
     stage: Stage<'_>,
 ) -> Result<Placed> {
-    let drawn = candidates::draw(shape, layers, fluence, medium, params)?;
-    if drawn.list.is_empty() {
-        return Err(Error::NoRoom("no light reaches its inside, or nothing there scatters".to_owned()));
-    }
     stage.announce(8);
-    let offered: Vec<Candidate> = drawn.surface.iter().chain(&drawn.list).copied().collect();
-    let mut samples = darts::throw_to_count(shape, &offered, params.samples, &stage)?;
+    let scaled = |c: &Candidate| Candidate { radius: (c.radius * factor(c.position)).clamp(0.5, 2.0), ..*c };
+    let list: Vec<Candidate> = offered.surface.par_iter().chain(&offered.list).map(scaled).collect();
+    let mut samples = darts::throw_to_count(shape, &list, wanted, &stage)?;
     let snapped = snap_to_boundary(shape, &mut samples);
-    let inside = drawn.list.iter().take(PROBES_PER_SAMPLE * samples.len());
-    let probes = inside.chain(drawn.surface.iter().step_by(2)).copied().collect();
-    Ok(Placed { samples, probes, snapped, dark: drawn.dark })
+    let inside = offered.list.iter().take(PROBES_PER_SAMPLE * samples.len());
+    let probes = inside.chain(offered.surface.iter().step_by(2)).copied().collect();
+    Ok(Placed { samples, probes, snapped, dark: offered.dark })
 }
 
 /// Moves samples close to the boundary onto it, just inside, and rounds all positions to what the asset stores.

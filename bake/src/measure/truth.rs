@@ -38,14 +38,14 @@ struct Node {
 }
 
 /// The points of all rays.
-pub(super) struct Nodes {
+pub(crate) struct Nodes {
     position: Vec<DVec3>,
     node: Vec<Node>,
     rays: usize,
 }
 
 /// Two estimates of one channel's radiance for each ray.
-pub(super) type Radiance = Vec<[f32; 2]>;
+pub(crate) type Radiance = Vec<[f32; 2]>;
 
 impl Nodes {
     /// Points along the rays of all views.
@@ -66,6 +66,23 @@ impl Nodes {
             })
             .collect();
         Self { position: node.iter().map(|n| n.position).collect(), node, rays: rays.len() }
+    }
+
+    /// Number of rays.
+    pub fn rays(&self) -> usize {
+        self.rays
+    }
+
+    /// Every point with its ray and what light there adds to the ray, over all channels.
+    pub fn emitters(&self) -> impl Iterator<Item = (DVec3, usize, f64)> {
+        self.node.iter().map(|n| (n.position, n.estimate / 2, f64::from(n.weight.element_sum())))
+    }
+
+    /// What the points of each ray add together.
+    pub fn emission(&self) -> Vec<f64> {
+        let mut total = vec![0.0; self.rays];
+        self.emitters().for_each(|(_, ray, weight)| total[ray] += weight);
+        total
     }
 
     /// Radiance of every ray for lights in `directions` (towards each light), of the channel `light` % 3 each.

@@ -11,7 +11,7 @@ use rand_pcg::Pcg64Mcg;
 use rayon::prelude::*;
 
 /// Parallel rays from one direction.
-pub(super) struct View {
+pub(crate) struct View {
     /// The way the rays go, unit length.
     pub direction: DVec3,
     /// Those that meet the object: evenly over its silhouette.
@@ -19,7 +19,7 @@ pub(super) struct View {
 }
 
 /// A ray that meets the object.
-pub(super) struct Ray {
+pub(crate) struct Ray {
     /// In front of the object, world coordinates.
     pub origin: DVec3,
     /// Its inside pieces, in order.
@@ -36,7 +36,7 @@ const WANTED: usize = 64;
 const PIXELS: f64 = 200.0;
 
 /// `count` views (even) of the object, seeded; those that miss it have no rays.
-pub(super) fn views(
+pub(crate) fn views(
     shape: &Shape<'_>,
     ior: f64,
     count: usize,

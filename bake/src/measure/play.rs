@@ -16,7 +16,7 @@ use rayon::prelude::*;
 const PIECES: usize = 4;
 
 /// An asset ready to be played.
-pub(super) struct Player<'a> {
+pub(crate) struct Player<'a> {
     asset: &'a Asset,
     cloud: Cloud,
     stencil: Stencil,
@@ -141,7 +141,7 @@ fn along(asset: &Asset, origin: Vec3, direction: Vec3, start: f32, end: f32) -> 
 }
 
 /// The asset's own light at its samples, towards fixed directions.
-pub(super) struct Stored<'a> {
+pub(crate) struct Stored<'a> {
     asset: &'a Asset,
     depth: Coefficients,
     boundary: Coefficients,

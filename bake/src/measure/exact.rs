@@ -1,7 +1,7 @@
 //! Light that arrives at the samples as it is: means over their cells, no harmonics.
 
 use crate::field::Shape;
-use crate::fit::Lit;
+use crate::fit::Cells;
 use crate::progress::Stage;
 use crate::{Prepared, Result};
 use diaphane_formats::visibility::project_with;
@@ -9,14 +9,14 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 /// For each of `lights` (unit vector towards it, channel): the mean of ψβ over every sample's cell.
-pub(super) fn means<const N: usize>(
+pub(crate) fn means(
     shape: &Shape<'_>,
     medium: &Prepared<'_>,
-    lit: &Lit,
-    lights: [(DVec3, usize); N],
+    cells: &Cells,
+    lights: &[(DVec3, usize)],
     stage: Stage<'_>,
 ) -> Result<Vec<Vec<f32>>> {
-    let points = lit.cells.points();
+    let points = cells.points();
     lights
         .par_iter()
         .map(|(towards, channel)| {
@@ -26,7 +26,7 @@ pub(super) fn means<const N: usize>(
             let arriving: Vec<f32> =
                 rows.forward.iter().enumerate().map(|(q, m)| (-kappa * m).exp() * through(q)).collect();
             stage.step(1)?;
-            let size = lit.cells.size;
+            let size = cells.size;
             Ok(arriving.chunks_exact(size).map(|cell| cell.iter().sum::<f32>() / size as f32).collect())
         })
         .collect()
