@@ -90,7 +90,7 @@ pub fn bake(input: &Input<'_>, params: &Params, progress: &dyn Progress) -> Resu
 fn bake_once(input: &Input<'_>, params: &Params, timed: &mut Timed<'_>) -> Result<(Asset, Report)> {
     let shape = timed.stage("distance field", |p| field::Shape::new(input.mesh, params, p))?;
     let medium = timed.stage("medium", |_| Ok(Prepared::new(input.medium, input.mesh)))?;
-    let layers = timed.stage("layers", |p| layers::build(&shape, input.medium, p))?;
+    let layers = timed.stage("layers", |p| layers::build(&shape, input.medium, params.placement, p))?;
     let density = timed.stage("density", |p| density::evaluate(&shape, &layers, &medium, params, p))?;
     let (offered, placed) = timed.stage("samples", |p| {
         let offered = samples::offer(&shape, &layers, &density, input.medium, params)?;

@@ -19,6 +19,8 @@ pub struct Params {
     pub light_error: f64,
     /// Seed of all random choices.
     pub seed: u64,
+    /// Where samples may stand.
+    pub placement: Placement,
     /// What the harmonics represent.
     pub representation: Representation,
     /// Full width at half maximum of a kernel in disk radii.
@@ -59,6 +61,16 @@ pub enum Representation {
     Lobe,
 }
 
+/// Where samples may stand.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Placement {
+    /// On the boundary and anywhere under it.
+    Boundary,
+    /// On layers at a constant offset, the first one an offset under the boundary: the thesis' choice (section 3.2.1),
+    /// the documented baseline.
+    Layers,
+}
+
 /// Named sets of parameters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Preset {
@@ -85,6 +97,7 @@ impl Params {
             order,
             light_error,
             seed: 1,
+            placement: Placement::Boundary,
             representation: Representation::Lobe,
             width_factor: 1.35,
             refine: if preset == Preset::Fine { 4 } else { 0 },

@@ -107,7 +107,8 @@ fn harmonics_reproduce_the_chords_of_a_ball() {
             let b = p.dot(direction);
             let chord = -b + (b * b + 1.0 - p.length_squared()).sqrt();
             sh::evaluate_f32(6, direction.as_vec3().to_array(), &mut basis);
-            let value: f32 = depth.of(i).iter().zip(&basis).map(|(c, y)| c * y).sum();
+            let lobe = asset.samples.lobe[i].dot(direction.as_vec3()).max(0.0);
+            let value = lobe + depth.of(i).iter().zip(&basis).map(|(c, y)| c * y).sum::<f32>();
             let psi = (-f64::from(asset.info.encoding.decode(value))).exp();
             let exact = (-kappa * chord).exp();
             error += (psi - exact).powi(2);

@@ -304,11 +304,12 @@ impl Path {
                 );
             }
         }
-        for k in 0..LANES {
+        for (k, mean) in mean.iter_mut().enumerate() {
             let low = clipped.from[k] - chunk.tc[k];
-            let moved = mean[k] + self.shift[k];
+            let high = low + clipped.length[k];
+            let moved = *mean + self.shift[k];
             let moved = if moved > low { moved } else { low };
-            mean[k] = if moved < low + clipped.length[k] { moved } else { low + clipped.length[k] };
+            *mean = if moved < high { moved } else { high };
         }
         (out, mean)
     }

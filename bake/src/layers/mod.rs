@@ -7,6 +7,7 @@ mod isosurface;
 
 use crate::Result;
 use crate::field::Shape;
+use crate::params::Placement;
 use crate::progress::Stage;
 use diaphane_formats::medium::Medium;
 use glam::DVec3;
@@ -26,17 +27,26 @@ pub(crate) struct Layer {
 
 /// Each slab is this much thicker than the one above it.
 const GROWTH: f64 = 1.25;
+/// The thesis' constant offset in mean spacings of samples.
+const THESIS_OFFSET: f64 = 0.5;
 
-pub(crate) fn build(shape: &Shape<'_>, medium: &Medium, stage: Stage<'_>) -> Result<Vec<Layer>> {
+pub(crate) fn build(
+    shape: &Shape<'_>,
+    medium: &Medium,
+    placement: Placement,
+    stage: Stage<'_>,
+) -> Result<Vec<Layer>> {
     let deepest = shape.grid.depth.iter().copied().fold(0.0, f32::max) as f64;
     // Slabs no thicker than the samples' spacing or half a mean free path near the surface.
     let kappa = medium.reference_extinction().max(1e-9 / shape.diagonal);
     let first = (0.7 * shape.spacing).min(0.5 / kappa).max(shape.spacing * 0.2).max(deepest / 40.0);
-    let mut offsets = vec![0.02 * shape.spacing.min(shape.grid.cell)];
-    let mut step = first;
+    let (mut offsets, mut step, growth) = match placement {
+        Placement::Boundary => (vec![0.02 * shape.spacing.min(shape.grid.cell)], first, GROWTH),
+        Placement::Layers => (vec![THESIS_OFFSET * shape.spacing], THESIS_OFFSET * shape.spacing, 1.0),
+    };
     while let Some(next) = offsets.last().map(|o| o + step).filter(|n| *n < deepest) {
         offsets.push(next);
-        step = (step * GROWTH).min(4.0 * shape.spacing.max(first));
+        step = (step * growth).min(4.0 * shape.spacing.max(first));
     }
     stage.announce(offsets.len());
     let layers = offsets

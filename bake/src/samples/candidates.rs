@@ -4,7 +4,7 @@ use super::Candidate;
 use crate::density::LayerFluence;
 use crate::field::{Shape, inside_nodes};
 use crate::layers::Layer;
-use crate::params::{DARK, Params, RADIUS_EXPONENT};
+use crate::params::{BOUNDARY_SNAP, DARK, Params, Placement, RADIUS_EXPONENT};
 use crate::{Error, Result};
 use diaphane_formats::directions::hash;
 use diaphane_formats::medium::Medium;
@@ -27,6 +27,8 @@ pub(crate) struct Offered {
     /// On the boundary: offered before all others, so that the layer where light enters and leaves has no gaps.
     pub surface: Vec<Candidate>,
     pub list: Vec<Candidate>,
+    /// Samples closer to the boundary than this many radii are moved onto it.
+    pub snap: f64,
     pub dark: usize,
 }
 
@@ -60,6 +62,7 @@ pub(crate) fn offer(
         return Err(no_room());
     }
     let wanted = OVERSAMPLING * params.samples + 64;
+    let on_layers = params.placement == Placement::Layers;
     let one = |seed: u64, i: usize| {
         let mut rng = Pcg64Mcg::seed_from_u64(hash(seed, i as u64));
         // Stratified over the cumulative mass, so that every patch gets its share.
@@ -68,7 +71,7 @@ pub(crate) fn offer(
         let layer = &layers[patch.layer as usize];
         let corners = layer.triangles[patch.triangle as usize].map(|v| v as usize);
         let bary = barycentric(rng.random(), rng.random());
-        let down: f64 = rng.random();
+        let down: f64 = if on_layers { 0.0 } else { rng.random() };
         let mut position = DVec3::ZERO;
         let mut inward = DVec3::ZERO;
         let mut log_fluence = 0.0;
@@ -103,10 +106,14 @@ pub(crate) fn offer(
     if list.is_empty() {
         return Err(no_room());
     }
+    let list: Vec<Candidate> = order.into_iter().map(|(_, c)| c).collect();
+    if on_layers {
+        return Ok(Offered { surface: Vec::new(), list, snap: 0.0, dark });
+    }
     let fill = usable(shape, medium, &fill(shape, &list, layers))?;
     let surface =
         usable(shape, medium, &surface(shape, layers, fluence, medium, &relative_radius, params.seed))?;
-    Ok(Offered { surface, list: order.into_iter().map(|(_, c)| c).chain(fill).collect(), dark })
+    Ok(Offered { surface, list: list.into_iter().chain(fill).collect(), snap: BOUNDARY_SNAP, dark })
 }
 
 /// Candidates on the boundary: on the first layer in proportion to 1/radius², moved onto the mesh.

@@ -13,7 +13,6 @@ pub(crate) use candidates::{Offered, offer};
 
 use crate::Result;
 use crate::field::Shape;
-use crate::params::BOUNDARY_SNAP;
 use crate::progress::Stage;
 use diaphane_formats::asset::Places;
 use glam::DVec3;
@@ -55,14 +54,14 @@ pub(crate) fn place(
     let scaled = |c: &Candidate| Candidate { radius: (c.radius * factor(c.position)).clamp(0.5, 2.0), ..*c };
     let list: Vec<Candidate> = offered.surface.par_iter().chain(&offered.list).map(scaled).collect();
     let mut samples = darts::throw_to_count(shape, &list, wanted, &stage)?;
-    let snapped = snap_to_boundary(shape, &mut samples);
+    let snapped = snap_to_boundary(shape, offered.snap, &mut samples);
     let inside = offered.list.iter().take(PROBES_PER_SAMPLE * samples.len());
     let probes = inside.chain(offered.surface.iter().step_by(2)).copied().collect();
     Ok(Placed { samples, probes, snapped, dark: offered.dark })
 }
 
 /// Moves samples close to the boundary onto it, just inside, and rounds all positions to what the asset stores.
-fn snap_to_boundary(shape: &Shape<'_>, samples: &mut [Candidate]) -> usize {
+fn snap_to_boundary(shape: &Shape<'_>, snap: f64, samples: &mut [Candidate]) -> usize {
     let (low, high) = shape.mesh.bounds();
     let centre = 0.5 * (low + high);
     let places = Places::new([low, high].map(|p| (p - centre).as_vec3().to_array()));
@@ -70,7 +69,7 @@ fn snap_to_boundary(shape: &Shape<'_>, samples: &mut [Candidate]) -> usize {
     samples
         .par_iter_mut()
         .map(|s| {
-            let reach = (BOUNDARY_SNAP * s.radius).max(2.0 * margin);
+            let reach = (snap * s.radius).max(2.0 * margin);
             let mut moved = 0;
             if let Some(n) = shape.accel.nearest(s.position, reach) {
                 // Along the way from the surface to the sample, so that edges and corners work too.

@@ -1,4 +1,5 @@
-//! The published recipe (Bernabei's thesis, chapter 3) at the positions and radii of an asset's samples.
+//! The published recipe (Bernabei's thesis, chapter 3) at the positions and radii of an asset's samples; a sweep gives it
+//! samples on layers a constant offset apart, as section 3.2.1 places them.
 //!
 //!   L = scale · Σ_i v_i ψ_i(view) ∫_{-∞}^{∞} γ_i dt,   v_i = κs(b_i) Σ_l p(cos_l) E_l(b_i) ψ_i(ω_l)
 //!

@@ -8,7 +8,9 @@ use crate::rivals::grid::{self, Blend, Grid};
 use crate::rivals::march::{Light, March};
 use crate::rivals::object::Object;
 use crate::rivals::thesis::{self, Thesis, best_scale, scaled};
-use diaphane_bake::{Input, bake, progress::Progress, report::Report};
+use diaphane_bake::params::{Params, Placement};
+use diaphane_bake::progress::{Progress, Silent};
+use diaphane_bake::{Input, bake, report::Report};
 use diaphane_formats::asset::{Asset, encode, section_sizes};
 use diaphane_formats::picture::Picture;
 use diaphane_formats::scene::Scene;
@@ -50,6 +52,28 @@ pub struct Made {
 /// # Errors
 /// As [`bake`].
 pub fn make(case: &Case, baked: &Baked, seed: u64, progress: &dyn Progress) -> diaphane_bake::Result<Made> {
+    make_with(case, &baked.params(seed), progress)
+}
+
+/// The samples' places as the thesis chooses them, and next to no light.
+///
+/// # Errors
+/// As [`bake`].
+pub fn place_as_published(case: &Case, samples: usize, seed: u64) -> diaphane_bake::Result<Made> {
+    let params = Params {
+        samples,
+        seed,
+        placement: Placement::Layers,
+        directions: 32,
+        points_per_sample: 1,
+        order: 1,
+        certificate: false,
+        ..Params::default()
+    };
+    make_with(case, &params, &Silent)
+}
+
+fn make_with(case: &Case, params: &Params, progress: &dyn Progress) -> diaphane_bake::Result<Made> {
     let input = Input {
         mesh: &case.mesh,
         mesh_report: &case.mesh_report,
@@ -58,7 +82,7 @@ pub fn make(case: &Case, baked: &Baked, seed: u64, progress: &dyn Progress) -> d
         material_name: case.name.clone(),
     };
     let begun = Instant::now();
-    let (asset, report) = bake(&input, &baked.params(seed), progress)?;
+    let (asset, report) = bake(&input, params, progress)?;
     let seconds = begun.elapsed().as_secs_f64();
     let sections = section_sizes(&encode(&asset)?)?;
     let sum = |wanted: &dyn Fn(&str) -> bool| -> usize {

@@ -10,6 +10,7 @@ use validation::rivals::march::March;
 use validation::rivals::object::Object;
 use validation::rivals::shadows::Shadows;
 use validation::rivals::thesis::{self, Thesis};
+use validation::sweep::case::Case;
 use validation::sweep::measure::{self, Made, Shot};
 use validation::sweep::plan::Baked;
 use validation::sweep::record::{Method, Outcome};
@@ -17,14 +18,23 @@ use validation::sweep::references::Known;
 
 /// An asset, the object it was baked from, and what rivals store in its place.
 pub struct Bench<'a> {
+    case: &'a Case,
+    seed: u64,
     made: &'a Made,
     baked: Baked,
     object: &'a Object<'a>,
     frames: usize,
     players: [Option<Player>; 2],
-    thesis: Option<Thesis<'a>>,
+    thesis: Option<Published<'a>>,
     grid: Option<Grid>,
     shadows: Option<Shadows<'a>>,
+}
+
+/// The published recipe at the places that it chooses.
+struct Published<'a> {
+    thesis: Thesis<'a>,
+    samples: usize,
+    seconds: f64,
 }
 
 /// Size and making of what was drawn.
@@ -35,10 +45,16 @@ struct Stored {
 }
 
 impl<'a> Bench<'a> {
-    /// Nothing is made yet; a median is taken over `frames` frames.
-    pub fn new(made: &'a Made, baked: Baked, object: &'a Object<'a>, frames: usize) -> Self {
+    /// `made` is what was baked of `case` with `seed`, nothing else is made yet; a median is taken over `frames` frames.
+    pub fn new(
+        (case, seed): (&'a Case, u64),
+        made: &'a Made,
+        baked: Baked,
+        object: &'a Object<'a>,
+        frames: usize,
+    ) -> Self {
         let players = [None, None];
-        Self { made, baked, object, frames, players, thesis: None, grid: None, shadows: None }
+        Self { case, seed, made, baked, object, frames, players, thesis: None, grid: None, shadows: None }
     }
 
     /// Makes one measurement.
@@ -98,14 +114,20 @@ impl<'a> Bench<'a> {
 
     fn thesis(&mut self, scene: &Scene, reference: &Known) -> anyhow::Result<(Shot, Stored)> {
         let frame = self.frame(scene)?;
-        let (object, made) = (self.object, self.made);
-        let thesis =
-            self.thesis.get_or_insert_with(|| Thesis::new(object, &made.asset, self.baked.directions));
-        let shot = measure::recipe(thesis, &frame, reference, self.frames)?;
+        let published = match &self.thesis {
+            Some(published) => published,
+            None => {
+                let placed = measure::place_as_published(self.case, self.baked.samples, self.seed)?;
+                let thesis = Thesis::new(self.object, &placed.asset, self.baked.directions);
+                let seconds = placed.placing_seconds + thesis.seconds;
+                self.thesis.insert(Published { thesis, samples: placed.asset.samples.len(), seconds })
+            }
+        };
+        let shot = measure::recipe(&published.thesis, &frame, reference, self.frames)?;
         let stored = Stored {
-            light_bytes: made.asset.samples.len() * thesis::BYTES,
+            light_bytes: published.samples * thesis::BYTES,
             sample_bytes: thesis::BYTES as f64,
-            seconds: made.placing_seconds + thesis.seconds,
+            seconds: published.seconds,
         };
         Ok((shot, stored))
     }

@@ -119,7 +119,7 @@ impl<'a> Sweep<'a> {
                     Some(object) => object,
                     empty => empty.insert(Object::new(&case.mesh, &case.medium, &made.asset)?),
                 };
-                let mut bench = Bench::new(&made, job.baked, object, self.checked.frames);
+                let mut bench = Bench::new((case, self.seed), &made, job.baked, object, self.checked.frames);
                 for w in missing {
                     let scene = case.scene(w.key.lights, self.seed);
                     let reference = match known.entry(w.key.lights) {
