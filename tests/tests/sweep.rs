@@ -45,12 +45,12 @@ fn measures_once_and_goes_on_where_it_was() {
     let bench = Workbench::new();
     let read = |name: &str| std::fs::read_to_string(bench.path("o").join(name)).unwrap();
     let first = sweep(&bench, &[]);
-    // Assets: base, 30 samples, 2 bands, transmittance. Splats of each, the recipe and the grid for two, the march
-    // with two numbers of steps: 4 + 2 + 2 + 2 drawings with two numbers of lights.
+    // Assets: base, 30 samples, 2 bands, three other encodings. Splats of each, the recipe and the grid for two, the
+    // march with two numbers of steps: 6 + 2 + 2 + 2 drawings with two numbers of lights.
     let out = text(&first.stdout);
-    assert!(out.contains("20 measurements (20 new)"), "{out}");
+    assert!(out.contains("24 measurements (24 new)"), "{out}");
     let csv = read("sweep.csv");
-    assert_eq!(csv.lines().count(), 21);
+    assert_eq!(csv.lines().count(), 25);
     let columns = csv.lines().next().unwrap().split(',').count();
     assert!(csv.lines().all(|l| l.split(',').count() == columns), "{csv}");
     for name in ["error-time-1", "error-time-3", "error-bytes", "error-bake"] {
@@ -66,7 +66,7 @@ fn measures_once_and_goes_on_where_it_was() {
     assert!(enough.all(|r| r["ratio"].as_f64().unwrap() > 1.0), "{recipe:?}");
     // Again: nothing is measured, and the table, which holds times, is the same.
     let again = sweep(&bench, &[]);
-    assert!(text(&again.stdout).contains("20 measurements (0 new)"));
+    assert!(text(&again.stdout).contains("24 measurements (0 new)"));
     assert_eq!(read("sweep.csv"), csv);
     // A torn line is said and measured again, the others are not.
     let lines = read("measurements.jsonl");
@@ -74,10 +74,10 @@ fn measures_once_and_goes_on_where_it_was() {
     std::fs::write(bench.path("o/measurements.jsonl"), torn).unwrap();
     let mended = sweep(&bench, &[]);
     assert!(text(&mended.stderr).contains("line 1 is damaged"), "{mended:?}");
-    assert!(text(&mended.stdout).contains("20 measurements (1 new)"));
+    assert!(text(&mended.stdout).contains("24 measurements (1 new)"));
     // One more step measures one more setting; another seed measures everything.
     let more = sweep(&bench, &["--grid-steps", "2"]);
-    assert!(text(&more.stdout).contains("20 measurements (4 new)"), "{more:?}");
+    assert!(text(&more.stdout).contains("24 measurements (4 new)"), "{more:?}");
     let other = sweep(&bench, &["--seed", "2", "--methods", "march"]);
     assert!(text(&other.stdout).contains("4 measurements (4 new)"));
 }

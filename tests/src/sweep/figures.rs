@@ -1,7 +1,7 @@
 //! Measurements as charts: error against frame time, bytes and bake time.
 
 use super::analysis::front;
-use super::plan::Base;
+use super::plan::{Base, EncodingName};
 use super::record::{Method, Record};
 use crate::plot::{Chart, Joined, Panel, Point, Series, Unit};
 
@@ -90,7 +90,7 @@ fn series(records: &[&Record], base: Base, against: Against) -> Vec<Series> {
         k.method != Method::Splats
             || (k.order == base.order
                 && k.directions == base.directions
-                && k.encoding == "reciprocal"
+                && k.encoding == EncodingName::DEFAULT.name()
                 && k.preset == "standard")
     };
     let pick = |name: &str, style: usize, joined: Joined, wanted: &dyn Fn(&Record) -> bool| {

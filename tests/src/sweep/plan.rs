@@ -58,6 +58,9 @@ pub enum EncodingName {
 }
 
 impl EncodingName {
+    /// What a bake takes if nothing is said.
+    pub const DEFAULT: Self = Self::Lobe;
+
     /// Name in files.
     pub fn name(self) -> &'static str {
         match self {
@@ -163,7 +166,7 @@ impl Axes {
         let base = Baked {
             samples: self.base.samples,
             order: self.base.order,
-            encoding: EncodingName::Lobe,
+            encoding: EncodingName::DEFAULT,
             directions: self.base.directions,
             preset: PresetName::Standard,
         };
@@ -224,7 +227,7 @@ mod tests {
             base: Base { samples: 100, order: 5, directions: 64 },
             samples: vec![50, 100],
             orders: vec![4, 5],
-            encodings: vec![EncodingName::Reciprocal, EncodingName::Transmittance],
+            encodings: vec![EncodingName::DEFAULT, EncodingName::Transmittance],
             directions: vec![32, 64],
             presets: vec![PresetName::Draft],
             pair_samples: vec![50, 100],

@@ -116,7 +116,7 @@ pub mod samples {
             method: Method::Splats,
             samples,
             order: 5,
-            encoding: "reciprocal".to_owned(),
+            encoding: crate::sweep::plan::EncodingName::DEFAULT.name().to_owned(),
             directions: 64,
             preset: "standard".to_owned(),
             steps: 0,

@@ -69,7 +69,7 @@ mod tests {
         let lines: Vec<&str> = text.lines().collect();
         assert_eq!(lines.len(), 3);
         assert_eq!(lines[1].split(',').count(), COLUMNS.split(',').count());
-        assert!(lines[1].starts_with("ball,splats,5,5,reciprocal,64,standard,,8,cpu,10,5,"), "{}", lines[1]);
+        assert!(lines[1].starts_with("ball,splats,5,5,lobe,64,standard,,8,cpu,10,5,"), "{}", lines[1]);
         assert!(lines[2].starts_with("\"a,\"\"b\"\"\",splats,7,"), "{}", lines[2]);
     }
 }

@@ -135,7 +135,7 @@ impl Arguments {
         let list = |given: &Option<Vec<usize>>, full: &[usize], short: &[usize]| -> Vec<usize> {
             given.clone().unwrap_or_else(|| if quick { short.to_vec() } else { full.to_vec() })
         };
-        let base = list(&self.base, &[8_000, 10, 512], &[2_000, 10, 512]);
+        let base = list(&self.base, &[8_000, 10, 768], &[2_000, 10, 768]);
         let [samples, order, directions] = base[..] else {
             anyhow::bail!("--base takes three numbers (samples, bands, directions), not {}", base.len());
         };
@@ -149,7 +149,7 @@ impl Arguments {
             samples: list(&self.samples, &[1_000, 2_000, 4_000, 8_000, 16_000, 32_000], &[500, 2_000, 4_000]),
             orders: list(&self.orders, &[3, 5, 7, 10, 14], &[3, 5, 7]),
             encodings: self.encodings.clone(),
-            directions: list(&self.directions, &[64, 128, 256, 512, 1_024], &[128]),
+            directions: list(&self.directions, &[64, 128, 256, 512, 768, 1_536], &[128]),
             presets: names(&presets, "--presets", |n| PresetName::from_str(n, true).ok())?,
             pair_samples: list(&self.pair_samples, &[2_000, 8_000, 32_000], &[]),
             pair_orders: list(&self.pair_orders, &[5, 7, 10], &[]),

@@ -6,7 +6,7 @@ mod text;
 pub use text::text;
 
 use super::analysis::{Cost, Rival, Verdict, crossover};
-use super::plan::Base;
+use super::plan::{Base, EncodingName};
 use super::record::{Key, Method, Record};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -109,7 +109,7 @@ fn is_default(key: &Key, base: Base) -> bool {
     key.method == Method::Splats
         && key.order == base.order
         && key.directions == base.directions
-        && key.encoding == "reciprocal"
+        && key.encoding == EncodingName::DEFAULT.name()
         && key.preset == "standard"
 }
 
