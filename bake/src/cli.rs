@@ -58,13 +58,14 @@ struct BakeArguments {
     /// Stored samples (met within 5 %).
     #[arg(long, value_name = "N")]
     samples: Option<usize>,
-    /// Directions in which the optical depth of each sample is computed.
+    /// Directions in which the optical depth of each sample is computed (rounded up to an even number).
     #[arg(long, value_name = "D")]
     directions: Option<usize>,
-    /// Points around each sample over which its transmittance is averaged.
+    /// Points around each sample that one direction sees; others see other points, four times as many in all.
     #[arg(long, value_name = "P")]
     points: Option<usize>,
-    /// Most bands of spherical harmonics, 1 to 14; a sample gets as few as it needs.
+    /// Most bands of spherical harmonics, 1 to 14; a sample gets as few as it needs. Not given, samples in need get up to
+    /// 14 with the bytes that others leave.
     #[arg(long, value_name = "K")]
     sh_order: Option<usize>,
     /// Error of a sample's transmittance below which it gets no more bands (0: every sample gets all).
@@ -128,7 +129,9 @@ impl BakeArguments {
         params.samples = self.samples.unwrap_or(params.samples);
         params.directions = self.directions.unwrap_or(params.directions);
         params.points_per_sample = self.points.unwrap_or(params.points_per_sample);
-        params.order = self.sh_order.unwrap_or(params.order);
+        if let Some(order) = self.sh_order {
+            (params.order, params.extra_bands) = (order, 0);
+        }
         params.light_error = self.light_error.unwrap_or(params.light_error);
         params.refine = self.refine.unwrap_or(params.refine);
         params.seed = self.seed.unwrap_or(params.seed);

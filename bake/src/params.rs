@@ -8,12 +8,16 @@ use diaphane_formats::sh::MAX_ORDER;
 pub struct Params {
     /// Stored samples, met within 5 %.
     pub samples: usize,
-    /// Directions in which the optical depth of each sample is computed.
+    /// Directions in which the optical depth of each sample is computed; an odd number is rounded up, because opposite
+    /// directions share one projection.
     pub directions: usize,
-    /// Points around each sample over which its transmittance is averaged.
+    /// Points around each sample that a direction sees; the next directions see others, four times as many in all.
     pub points_per_sample: usize,
-    /// Most bands of spherical harmonics, 1..=14.
+    /// Most bands of spherical harmonics of all samples, 1..=14.
     pub order: usize,
+    /// Bands beyond `order` of the samples that need them most, as many as the bytes allow that others leave; never beyond
+    /// 14 bands.
+    pub extra_bands: usize,
     /// A sample gets no more bands once the root mean square error of its transmittance is below this; 0: all get
     /// all.
     pub light_error: f64,
@@ -95,6 +99,7 @@ impl Params {
             directions,
             points_per_sample,
             order,
+            extra_bands: if preset == Preset::Draft { 2 } else { 4 },
             light_error,
             seed: 1,
             placement: Placement::Boundary,
@@ -104,6 +109,11 @@ impl Params {
             certificate: true,
             max_error: None,
         }
+    }
+
+    /// Most bands of any sample.
+    pub(crate) fn peak_order(&self) -> usize {
+        self.order.saturating_add(self.extra_bands).min(MAX_ORDER)
     }
 
     pub(crate) fn validate(&self) -> Result<()> {

@@ -81,7 +81,7 @@ impl Report {
         }
         Self {
             samples: lit.samples.len(),
-            directions: params.directions,
+            directions: lit.directions.len(),
             sh_order: params.order,
             rays: lit.rays,
             seconds,

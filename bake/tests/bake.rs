@@ -22,7 +22,15 @@ fn medium(kappa: f64, ior: f64, density: Density) -> Medium {
 
 fn small() -> Params {
     let draft = Params::preset(Preset::Draft);
-    Params { samples: 1200, directions: 64, points_per_sample: 4, order: 4, certificate: false, ..draft }
+    Params {
+        samples: 1200,
+        directions: 64,
+        points_per_sample: 4,
+        order: 4,
+        extra_bands: 0,
+        certificate: false,
+        ..draft
+    }
 }
 
 fn run(mesh: &(Mesh, MeshReport), medium: &Medium, params: &Params) -> diaphane_bake::Result<Asset> {

@@ -25,6 +25,7 @@ fn small() -> Params {
         directions: 64,
         points_per_sample: 4,
         order: 4,
+        extra_bands: 0,
         light_error: 0.0,
         ..Params::preset(Preset::Draft)
     }

@@ -7,6 +7,7 @@ use diaphane_bake::report::Report;
 use diaphane_bake::{Error, Input, bake};
 use diaphane_formats::asset::{Asset, encode, parse};
 use diaphane_formats::encoding::Encoding;
+use diaphane_formats::harmonics::bytes;
 use diaphane_formats::medium::{Density, Medium};
 use diaphane_formats::mesh::Mesh;
 use diaphane_formats::phase::Phase;
@@ -29,7 +30,7 @@ fn run(flat: bool, params: &Params) -> diaphane_bake::Result<(Asset, Report)> {
 
 fn small() -> Params {
     let draft = Params::preset(Preset::Draft);
-    Params { samples: 1500, directions: 128, order: 6, ..draft }
+    Params { samples: 1500, directions: 128, order: 6, extra_bands: 0, ..draft }
 }
 
 #[test]
@@ -64,6 +65,20 @@ fn refinement_is_the_same_for_any_number_of_threads() {
 fn refinement_is_refused_out_of_range() {
     let error = run(false, &Params { refine: 101, ..small() }).unwrap_err();
     assert!(matches!(&error, Error::Parameter(text) if text.contains("--refine")), "{error}");
+}
+
+#[test]
+fn bytes_that_some_samples_leave_go_to_those_in_need() {
+    // Deep samples of a ball need few bands, those under its surface more than it grants.
+    let params = Params { light_error: 0.02, certificate: false, ..small() };
+    let (plain, _) = run(false, &params).unwrap();
+    let (lent, _) = run(false, &Params { extra_bands: 4, ..params }).unwrap();
+    let most = |a: &Asset| a.samples.depth.order.iter().copied().max().unwrap();
+    assert_eq!((most(&plain), most(&lent)), (6, 10));
+    // As much as if all had all bands, and no more.
+    let budget = lent.samples.len() * bytes(6);
+    let used = |a: &Asset| a.samples.depth.codes.len();
+    assert!(used(&plain) < used(&lent) && used(&lent) <= budget, "{} {}", used(&plain), used(&lent));
 }
 
 #[test]

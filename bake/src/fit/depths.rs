@@ -1,8 +1,9 @@
 //! Optical depth of every sample in every direction, by projecting the mesh along each.
 //!
 //! ψ of a sample is a mean over its cell. One direction sees a few of the cell's points, the next one others: the fit
-//! over all directions is smooth, so that few rays each average the cell as well as many would (measured at 20,000
-//! samples and equal rays: see README).
+//! over all directions is smooth, so that few rays each average the cell as well as many would (measured on the layered
+//! cube at 20,000 samples and equal rays: error 0.063 with 512 directions that all see the same 6 points, 0.055 with 1,024
+//! that see 3 of 12).
 
 use super::cells::Cells;
 use crate::field::Shape;

@@ -2,7 +2,7 @@
 
 use super::Bench;
 use crate::Result;
-use crate::fit::{Cells, Light, weights};
+use crate::fit::{Cells, Light, boundary_order, weights};
 use crate::measure::exact;
 use crate::measure::play::Player;
 use crate::measure::truth::{Nodes, Radiance};
@@ -68,9 +68,9 @@ impl Trial {
         let seed = hash(bench.params.seed, 97);
         let cells = Cells::new(bench.shape, medium, &placed.samples, POINTS, seed)?;
         let weight = weights(&placed.samples, &placed.probes, width_factor, stage)?;
-        let params = &crate::params::Params { width_factor, order: 1, ..bench.params.clone() };
+        let params = &crate::params::Params { width_factor, ..bench.params.clone() };
         let stand = Stand { samples: &placed.samples, cells: &cells, discarded: 0 };
-        let light = Light::none(placed.samples.len(), medium.ior());
+        let light = Light::none(placed.samples.len(), boundary_order(medium.ior(), params.order));
         let asset = pack(bench.input, bench.medium.sampled.as_ref(), params, &stand, light, weight)?;
         let player = Player::new(&asset, &self.views);
         stage.announce(2 * LIGHTS);

@@ -67,6 +67,7 @@ pub fn place_as_published(case: &Case, samples: usize, seed: u64) -> diaphane_ba
         directions: 32,
         points_per_sample: 1,
         order: 1,
+        extra_bands: 0,
         certificate: false,
         ..Params::default()
     };

@@ -131,13 +131,16 @@ pub struct Baked {
 impl Baked {
     /// What the bake is told; `seed` chooses its randomness.
     pub fn params(&self, seed: u64) -> Params {
+        let preset = self.preset.params();
         Params {
             samples: self.samples,
             order: self.order,
+            // Only whole defaults lend bytes from sample to sample.
+            extra_bands: if self.order == preset.order { preset.extra_bands } else { 0 },
             directions: self.directions,
             representation: self.encoding.representation(),
             seed,
-            ..self.preset.params()
+            ..preset
         }
     }
 }
