@@ -36,7 +36,7 @@ impl Light {
     pub fn none(count: usize, boundary_order: usize) -> Self {
         let dark = |order: usize| Coefficients::zeros(vec![order as u8; count]).quantised();
         let boundary = if boundary_order == 0 { Harmonics::default() } else { dark(boundary_order) };
-        Self { encoding: Encoding::RECIPROCAL, depth: dark(0), lobe: Vec::new(), boundary }
+        Self { encoding: Encoding::RECIPROCAL, depth: dark(1), lobe: Vec::new(), boundary }
     }
 }
 
