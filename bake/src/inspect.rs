@@ -77,7 +77,7 @@ fn print_text(path: &Path, asset: &Asset, sections: &[(&'static str, usize)], by
         None => println!("  density      {} everywhere", i.uniform_density),
     }
     println!(
-        "  samples      {} ({} dropped as dark), {} directions, {} bands, {:?}, width factor {}",
+        "  samples      {} ({} dropped as dark), {} directions, at most {} bands, {:?}, width factor {}",
         i.samples, i.discarded, p.directions, i.order, i.encoding, i.width_factor
     );
     println!("  error        {}", certified(i.certificate.as_ref()));
