@@ -32,7 +32,7 @@ pub(crate) struct Stage<'a> {
 }
 
 impl Stage<'_> {
-    /// Announces how many units follow.
+    /// Announces how many units follow; again where a stage learns of its work in parts.
     pub fn announce(&self, total: usize) {
         self.progress.stage(self.name, total as u64);
     }

@@ -8,7 +8,8 @@ use diaphane_formats::asset::{Asset, Certificate, encode};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// What refinement did: relative errors of ray integrals with exact light, on rays and lights of its own.
+/// What refinement did: relative errors of ray integrals with exact light, on rays and lights of its own; infinite (null
+/// in JSON) where no light leaves the object.
 #[derive(Clone, Debug, Serialize)]
 pub struct Refinement {
     /// Before.

@@ -57,7 +57,8 @@ impl Progress for Bars {
         }
         let mut current = self.lock();
         if current.name == name {
-            current.bar.set_length(total);
+            // A stage may announce its work in parts: what is done stays done.
+            current.bar.set_length(current.bar.position() + total);
             return;
         }
         current.bar.finish();

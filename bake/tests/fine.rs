@@ -14,10 +14,14 @@ use diaphane_formats::phase::Phase;
 use glam::DVec3;
 
 fn run(flat: bool, params: &Params) -> diaphane_bake::Result<(Asset, Report)> {
+    run_with(flat, 0.8, params)
+}
+
+fn run_with(flat: bool, albedo: f64, params: &Params) -> diaphane_bake::Result<(Asset, Report)> {
     let raw = if flat { cuboid([0.5; 3], 2) } else { icosphere(1.0, 4) };
     let (mesh, report) = Mesh::from_triangles(raw.positions, raw.triangles).unwrap();
     let medium =
-        Medium::new(DVec3::splat(4.0), DVec3::splat(0.8), Phase::Isotropic, 1.0, Density::Uniform(1.0));
+        Medium::new(DVec3::splat(4.0), DVec3::splat(albedo), Phase::Isotropic, 1.0, Density::Uniform(1.0));
     let input = Input {
         mesh: &mesh,
         mesh_report: &report,
@@ -59,6 +63,16 @@ fn refinement_is_the_same_for_any_number_of_threads() {
         encode(&pool.install(|| run(true, &params)).unwrap().0).unwrap()
     });
     assert!(bytes[0] == bytes[1]);
+}
+
+#[test]
+fn what_sends_no_light_is_not_refined() {
+    let params = Params { samples: 600, refine: 3, ..small() };
+    let (asset, report) = run_with(false, 0.0, &params).unwrap();
+    let done = report.refinement.unwrap();
+    assert!(done.before == f64::INFINITY && done.after == f64::INFINITY, "{done:?}");
+    assert_eq!(asset.info.width_factor, params.width_factor);
+    assert_eq!(done.moves, 1, "a first move that does not pay is the last");
 }
 
 #[test]

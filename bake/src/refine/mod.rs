@@ -9,16 +9,14 @@
 mod map;
 mod trial;
 
-use crate::Input;
-use crate::Prepared;
-use crate::Result;
 use crate::field::Shape;
 use crate::params::Params;
 use crate::progress::Stage;
 use crate::report::Refinement;
 use crate::samples::{Offered, Placed, place};
+use crate::{Input, Prepared, Result};
 use map::Map;
-use trial::Trial;
+use trial::{Measured, Trial};
 
 /// What refinement works on.
 pub(crate) struct Bench<'a> {
@@ -35,6 +33,11 @@ const WIDTH_STEP: f32 = 1.12;
 const WIDTHS: [f32; 2] = [1.0, 2.2];
 /// A change must leave less than this part of the error.
 const PAYS: f64 = 0.985;
+
+/// Whether a change is kept: never where there is no light to measure, or no error left.
+fn pays(tried: &Measured, now: &Measured) -> bool {
+    tried.error() < PAYS * now.error()
+}
 
 /// The samples, the width of their kernels and what was done, after at most `rounds` moves.
 pub(crate) fn refine(
@@ -56,7 +59,7 @@ pub(crate) fn refine(
                 break;
             }
             let tried = trial.measure(bench, &placed, next, stage)?;
-            if tried.error() > PAYS * now.error() {
+            if !pays(&tried, &now) {
                 break;
             }
             (width, now) = (next, tried);
@@ -72,7 +75,7 @@ pub(crate) fn refine(
         let moved = place(bench.shape, bench.offered, bench.params.samples, |p| next.factor(p), stage)?;
         let tried = trial.measure(bench, &moved, width, stage)?;
         moves += 1;
-        if tried.error() > PAYS * now.error() {
+        if !pays(&tried, &now) {
             break;
         }
         (placed, now, map) = (moved, tried, next);
