@@ -11,7 +11,7 @@ pub struct Params {
     /// Directions in which the optical depth of each sample is computed; an odd number is rounded up, because opposite
     /// directions share one projection.
     pub directions: usize,
-    /// Points around each sample that a direction sees; the next directions see others, four times as many in all.
+    /// Points around each sample that a direction sees; the next directions see others, sixteen in all.
     pub points_per_sample: usize,
     /// Most bands of spherical harmonics of all samples, 1..=14.
     pub order: usize,
@@ -91,7 +91,7 @@ impl Params {
     pub fn preset(preset: Preset) -> Self {
         let (samples, directions, points_per_sample, order, light_error) = match preset {
             Preset::Draft => (5_000, 96, 4, 6, 0.03),
-            Preset::Standard => (50_000, 768, 4, 10, 0.01),
+            Preset::Standard => (50_000, 1024, 2, 10, 0.01),
             Preset::Fine => (50_000, 1_536, 4, 14, 0.003),
         };
         Self {

@@ -15,6 +15,7 @@
 use crate::sh::{MAX_ORDER, coefficient_count};
 use crate::{Error, Result};
 use half::f16;
+use rayon::prelude::*;
 
 /// Bits of a coefficient of `band`.
 pub const fn bits(band: usize) -> u32 {
@@ -111,15 +112,26 @@ impl Coefficients {
         self.order.is_empty()
     }
 
-    /// Quantises. Values that are not finite count as 0.
+    /// Quantises, every coefficient to the nearest code. Values that are not finite count as 0.
     pub fn quantised(&self) -> Harmonics {
+        self.quantised_by(|_, _, _| {})
+    }
+
+    /// Quantises; `choose` gets each function's index, its code book and the nearest codes, and may take others.
+    pub fn quantised_by(&self, choose: impl Fn(usize, &CodeBook<'_>, &mut [i32]) + Sync) -> Harmonics {
         let profile = self.profile();
-        let mut out = Harmonics { order: self.order.clone(), profile, ..Harmonics::default() };
-        for i in 0..self.len() {
-            let (scale, q) = quantise(self.of(i), &out.profile);
+        let one = |i: usize| {
+            let (scale, mut q) = quantise(self.of(i), &profile);
+            choose(i, &CodeBook { scale: scale.to_f32(), profile: &profile }, &mut q);
+            (scale, q)
+        };
+        let all: Vec<(f16, Vec<i32>)> = (0..self.len()).into_par_iter().with_min_len(64).map(one).collect();
+        let mut out = Harmonics { order: self.order.clone(), ..Harmonics::default() };
+        for (scale, q) in all {
             out.scale.push(scale);
             put(&q, &mut out.codes);
         }
+        out.profile = profile;
         out
     }
 
@@ -205,6 +217,33 @@ impl Harmonics {
     }
 }
 
+/// What the codes of one function stand for.
+pub struct CodeBook<'a> {
+    scale: f32,
+    profile: &'a [f32],
+}
+
+impl CodeBook<'_> {
+    /// The coefficient that code `q` of `band` stands for.
+    pub fn value(&self, band: usize, q: i32) -> f32 {
+        self.scale * self.profile[band] * expanded(q, band)
+    }
+
+    /// The code whose value is nearest to a finite `value`.
+    pub fn nearest(&self, band: usize, value: f32) -> i32 {
+        let unit = self.scale * self.profile[band];
+        if unit <= 0.0 {
+            return 0;
+        }
+        let u = (value.abs() / unit).min(1.0);
+        // The code below, and whether the next one is nearer.
+        let below = (u.powf(2.0 / 3.0) * most(band)) as i32;
+        let middle = 0.5 * (expanded(below, band) + expanded(below + 1, band));
+        let q = (below + i32::from(u > middle)).min(most(band) as i32);
+        if value < 0.0 { -q } else { q }
+    }
+}
+
 /// Where a coefficient's code is.
 struct Place {
     band: usize,
@@ -237,16 +276,16 @@ fn quantise(c: &[f32], profile: &[f32]) -> (f16, Vec<i32>) {
     let mut best = (f32::INFINITY, f16::ZERO, vec![0; c.len()]);
     for clip in CLIPS {
         let scale = f16::from_f32((clip * largest).min(65504.0));
-        if scale.to_f32() <= 0.0 {
+        let book = CodeBook { scale: scale.to_f32(), profile };
+        if book.scale <= 0.0 {
             continue;
         }
         let mut error = 0.0;
         let mut q = vec![0; c.len()];
         for ((q, v), place) in q.iter_mut().zip(c).zip(places(order)) {
-            let (v, unit) = (finite(*v), scale.to_f32() * profile[place.band]);
-            let u = (v.abs() / unit).min(1.0).powf(2.0 / 3.0) * most(place.band);
-            *q = if v < 0.0 { -(u.round() as i32) } else { u.round() as i32 };
-            error += (unit * expanded(*q, place.band) - v).powi(2);
+            let v = finite(*v);
+            *q = book.nearest(place.band, v);
+            error += (book.value(place.band, *q) - v).powi(2);
         }
         if error < best.0 {
             best = (error, scale, q);

@@ -22,7 +22,7 @@ use glam::Vec3;
 use pool::Pictures;
 
 /// Directions of view.
-const VIEWS: usize = 16;
+const VIEWS: usize = 32;
 /// Held-out directions of light, a multiple of the channels.
 const LIGHTS: usize = 18;
 /// Held-out lights that are played with exact light too: two for each channel, on both sides of the sphere.

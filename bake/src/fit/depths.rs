@@ -37,8 +37,8 @@ pub(crate) struct Lit {
     pub rays: u64,
 }
 
-/// Points of a cell for each one that a direction sees.
-const TURNS: usize = 4;
+/// Points of a cell, of which every direction sees its share.
+const POOL: usize = 16;
 
 /// Samples closer to the surface than this many disk radii may be lit by a face alone.
 const NEAR: f64 = 2.0;
@@ -58,7 +58,7 @@ pub(crate) fn depths(
     let half = forward.len();
     let directions: Vec<DVec3> = forward.iter().copied().chain(forward.iter().map(|d| -*d)).collect();
     let count = params.points_per_sample;
-    let size = if count == 1 { 1 } else { TURNS * count };
+    let size = if count == 1 { 1 } else { POOL.next_multiple_of(count) };
     let mut cells = Cells::new(shape, medium.medium, &placed.samples, size, hash(params.seed, 37))?;
     let (n, d) = (placed.samples.len(), directions.len());
     stage.announce(half);

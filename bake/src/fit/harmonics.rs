@@ -13,6 +13,7 @@
 use super::boundary::{BOUNDARY_ORDER, boundary};
 use super::depths::Lit;
 use super::least_squares::{BATCH, Basis, Batch, coefficient_places, in_order};
+use super::rounding::Rounding;
 use crate::Result;
 use crate::params::{Params, Representation};
 use crate::progress::Stage;
@@ -88,7 +89,13 @@ pub(crate) fn harmonics(lit: &Lit, params: &Params, stage: Stage<'_>) -> Result<
     }
     let stored = |f: &Fitted| lobe::vector(lobe::code(f.lobe));
     let lobe = if encoding.has_lobe() { fitted.iter().map(stored).collect() } else { Vec::new() };
-    Ok(Light { encoding, depth: depth.quantised(), lobe, boundary: boundary(lit, &basis, params) })
+    let rounding = Rounding::new(&basis, params.peak_order(), encoding);
+    let depth = depth.quantised_by(|i, book, codes| {
+        let lobe = lobe.get(i).copied().unwrap_or(Vec3::ZERO);
+        let beside = |d: usize| lobe.dot(lit.directions[d].as_vec3()).max(0.0);
+        rounding.choose(&fitted[i].coefficients, beside, book, codes);
+    });
+    Ok(Light { encoding, depth, lobe, boundary: boundary(lit, &basis, params) })
 }
 
 /// What is stored; ε is the one that fits some samples best.

@@ -1,7 +1,8 @@
 //! Fits of many functions on one set of directions at once: damped Gauss-Newton on the decoded transmittance, each
 //! step solved by conjugate gradients, all sums over directions done as matrix products.
 //!
-//! For values y = B x (B: directions × coefficients) decoded to ψ̂(y) it minimises Σ_ω (ψ̂ - ψ)². A step solves
+//! For values y = B x (B: directions × coefficients) decoded to ψ̂(y) it minimises Σ_ω c (ψ̂ - ψ)², c being [`importance`]
+//! of the step before (iteratively reweighted least squares). A step solves
 //! min |g (B d) - (ψ - ψ̂)|² + λ |d|² with g = dψ̂/dy. B has nearly orthogonal columns and g lies within 0..1, so ten
 //! iterations suffice and no normal matrix is ever formed.
 //!
@@ -26,6 +27,10 @@ const SLOPE_RIGHT: f32 = 0.02;
 const SLOPE_WRONG: f32 = 0.15;
 /// An improvement smaller than this fraction ends a fit.
 const ENOUGH: f32 = 2e-3;
+/// See [`importance`].
+const DARK_COUNTS: f32 = 0.3;
+/// See [`sensitivity`].
+const BLUR: f32 = 0.1;
 
 /// Harmonics in the first half of the directions, by parity.
 pub(super) struct Basis {
@@ -49,6 +54,17 @@ impl Basis {
             }
         }
         basis
+    }
+
+    /// Coefficients × directions of the first `order` bands, in the coefficients' order.
+    pub fn columns(&self, order: usize) -> Array2<f32> {
+        let mut out = Array2::zeros((coefficient_count(order), self.even.nrows()));
+        for (parity, basis) in [&self.even, &self.odd].into_iter().enumerate() {
+            places(order, parity)
+                .zip(basis.columns())
+                .for_each(|(at, column)| out.row_mut(at).assign(&column));
+        }
+        out
     }
 
     /// The first `order` bands of it.
@@ -191,7 +207,8 @@ impl Batch<'_> {
         }
     }
 
-    /// Improves `x` in at most `steps` steps; returns each row's root mean square error of ψ.
+    /// Improves `x` in at most `steps` steps; returns each row's root mean square error of ψ, weighted by
+    /// [`importance`].
     pub fn improve(
         &self,
         encoding: Encoding,
@@ -202,22 +219,24 @@ impl Batch<'_> {
         let (rows, columns) = psi.dim();
         let mut y = Array2::<f32>::zeros(psi.dim());
         let mut moved = y.clone();
-        let (mut weight, mut right) = (y.clone(), y.clone());
+        let (mut weight, mut right, mut counts) = (y.clone(), y.clone(), y.clone());
         self.forward(x, &mut y);
-        let mut least = errors(encoding, psi, &y);
         let mut damping = vec![DAMPING; rows];
         let mut done = vec![false; rows];
         for _ in 0..steps {
             if done.iter().all(|d| *d) {
                 break;
             }
-            Zip::from(&mut weight).and(&mut right).and(&y).and(psi).for_each(|w, r, y, psi| {
+            let fields = Zip::from(&mut weight).and(&mut right).and(&mut counts).and(&y).and(psi);
+            fields.for_each(|w, r, c, y, psi| {
                 let (value, slope) = decoded(encoding, *y);
                 let residual = psi - value;
                 let floor = if residual.abs() > 1e-3 { SLOPE_WRONG } else { SLOPE_RIGHT };
+                *c = importance(value);
+                let root = c.sqrt();
                 // τ is the one encoding in which ψ falls.
-                *w = if encoding == Encoding::Depth { slope.min(-floor) } else { slope.max(floor) };
-                *r = residual;
+                *w = root * if encoding == Encoding::Depth { slope.min(-floor) } else { slope.max(floor) };
+                *r = root * residual;
             });
             let step = self.linear(&weight, &right, &damping);
             self.forward(&step, &mut moved);
@@ -225,19 +244,15 @@ impl Batch<'_> {
                 if done[q] {
                     continue;
                 }
-                let mut length = 1.0;
-                let found = (0..3).any(|_| {
-                    let values = y.row(q).into_iter().zip(moved.row(q)).map(|(y, d)| y + length * d);
-                    let trial = error(encoding, psi.row(q).iter().copied().zip(values));
-                    if trial >= least[q] {
-                        length *= 0.4;
-                        return false;
-                    }
-                    done[q] = trial > least[q] * (1.0 - ENOUGH);
-                    least[q] = trial;
-                    true
-                });
-                if found {
+                let now = right.row(q).dot(&right.row(q));
+                let along = |length: f32| {
+                    let values = y.row(q).into_iter().zip(moved.row(q)).map(move |(y, d)| y + length * d);
+                    let errors = psi.row(q).into_iter().zip(values).zip(counts.row(q));
+                    errors.map(|((psi, y), c)| c * (decoded(encoding, y).0 - psi).powi(2)).sum::<f32>()
+                };
+                let found = [1.0, 0.4, 0.16].into_iter().map(|l| (l, along(l))).find(|(_, e)| *e < now);
+                if let Some((length, error)) = found {
+                    done[q] = error > now * (1.0 - ENOUGH);
                     x.row_mut(q).scaled_add(length, &step.row(q));
                     y.row_mut(q).scaled_add(length, &moved.row(q));
                     damping[q] = (damping[q] * 0.3).max(DAMPING);
@@ -247,7 +262,7 @@ impl Batch<'_> {
                 }
             }
         }
-        least.iter().map(|e| (e / columns as f32).sqrt()).collect()
+        errors(encoding, psi, &y).into_iter().map(|e| (e / columns as f32).sqrt()).collect()
     }
 }
 
@@ -256,14 +271,20 @@ fn butterfly(left: &mut ArrayViewMut2<'_, f32>, right: &mut ArrayViewMut2<'_, f3
     Zip::from(left).and(right).for_each(|a, b| (*a, *b) = (*a + *b, *a - *b));
 }
 
-/// Squared error of every row.
+/// Squared error of every row, weighted by [`importance`].
 fn errors(encoding: Encoding, psi: &Array2<f32>, y: &Array2<f32>) -> Vec<f32> {
-    let pairs = |q: usize| psi.row(q).into_iter().copied().zip(y.row(q).into_iter().copied());
-    (0..psi.nrows()).map(|q| error(encoding, pairs(q))).collect()
+    let one = |(psi, y): (&f32, &f32)| {
+        let value = decoded(encoding, *y).0;
+        importance(value) * (value - psi).powi(2)
+    };
+    psi.rows().into_iter().zip(y.rows()).map(|(psi, y)| psi.into_iter().zip(y).map(one).sum()).collect()
 }
 
-fn error(encoding: Encoding, pairs: impl Iterator<Item = (f32, f32)>) -> f32 {
-    pairs.map(|(psi, y)| (decoded(encoding, y).0 - psi).powi(2)).sum()
+/// How much a squared error counts where the fit says ψ̂, 1 at ψ̂ = 0.3: between absolute and relative error, because a
+/// scene that is lit through dark parts is looked at as bright as others. It is taken at the fit, not at ψ itself, which
+/// carries the noise of few rays: weights that follow the noise would pull the fit down.
+fn importance(psi: f32) -> f32 {
+    (0.3 + DARK_COUNTS) / (psi + DARK_COUNTS)
 }
 
 /// The stored value of ψ; depths beyond sight are all the same.
@@ -290,6 +311,14 @@ fn decoded(encoding: Encoding, y: f32) -> (f32, f32) {
             if psi >= 1.0 { (1.0, 0.0) } else { (psi, psi / (y * y)) }
         }
     }
+}
+
+/// Squared change of ψ̂, weighted by [`importance`], that a unit change of y makes around y: mean over y and what is
+/// `BLUR` less and more, because errors are large enough to reach brighter places. Never 0, so that clamped values stay
+/// clamped.
+pub(super) fn sensitivity(encoding: Encoding, y: f32) -> f32 {
+    let square = |y: f32| decoded(encoding, y).1.abs().max(SLOPE_RIGHT).powi(2);
+    importance(decoded(encoding, y).0) * (square(y - BLUR) + square(y) + square(y + BLUR)) / 3.0
 }
 
 #[cfg(test)]

@@ -5,6 +5,7 @@ mod cells;
 mod depths;
 mod harmonics;
 mod least_squares;
+mod rounding;
 mod weights;
 
 pub(crate) use boundary::boundary_order;
