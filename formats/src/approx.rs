@@ -3,7 +3,7 @@
 /// e^x for x ≤ 88, relative error below 2e-7; 1e-38 stands for all smaller values. The power of two is split off by
 /// adding 1.5·2^23, which leaves the nearest integer in the lowest bits; a polynomial of degree 6 does the rest.
 #[inline(always)]
-pub(crate) fn exp(x: f32) -> f32 {
+pub fn exp(x: f32) -> f32 {
     const ROUND: f32 = 12_582_912.0;
     let x = if x > -87.0 { x } else { -87.0 };
     let shifted = x * std::f32::consts::LOG2_E + ROUND;
@@ -18,7 +18,7 @@ pub(crate) fn exp(x: f32) -> f32 {
 /// erf x, absolute error below 5e-7: x P(x²)/Q(x²), fitted by reweighted least squares over |x| ≤ 3.95, where
 /// 1 - erf falls below half a unit in the last place.
 #[inline(always)]
-pub(crate) fn erf(x: f32) -> f32 {
+pub fn erf(x: f32) -> f32 {
     let x = if x > -3.95 { x } else { -3.95 };
     let x = if x < 3.95 { x } else { 3.95 };
     let s = x * x;

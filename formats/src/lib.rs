@@ -11,7 +11,7 @@
 //! | ψ = exp(-τ) | transmittance | - |
 //! | Φ(x) = ∫ψ dω | fluence | sr |
 
-mod approx;
+pub mod approx;
 pub mod asset;
 pub mod directions;
 pub mod encoding;

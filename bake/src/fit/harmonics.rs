@@ -154,7 +154,7 @@ impl Fitter<'_> {
                 open.append(&mut hopeless);
             }
             let mut still = Vec::new();
-            for group in open.chunks(BATCH) {
+            for group in open.chunks(TASK) {
                 let own: Vec<usize> = group.iter().map(|i| samples[*i]).collect();
                 let before: Vec<&Fitted> = group.iter().map(|i| &out[*i]).collect();
                 let fitted = self.plain(&own, &before, *order, STEPS[usize::from(last)]);
@@ -174,7 +174,7 @@ impl Fitter<'_> {
         if self.encoding.has_lobe() && bytes(order - 1) + LOBE_BYTES <= bytes(order) {
             // Whoever still misses the target has all bands.
             open.retain(|i| self.lit.surface[samples[*i]] != Vec3::ZERO);
-            for group in open.chunks(BATCH) {
+            for group in open.chunks(TASK) {
                 let own: Vec<usize> = group.iter().map(|i| samples[*i]).collect();
                 for (i, fitted) in group.iter().zip(self.with_lobe(&own, order - 1)) {
                     if self.held_out(&fitted) < self.held_out(&out[*i]) && fitted.lobe != Vec3::ZERO {
@@ -206,7 +206,7 @@ impl Fitter<'_> {
             fits
         });
         let better: Vec<Vec<Fitted>> = needy
-            .par_chunks(BATCH)
+            .par_chunks(TASK)
             .map(|group| {
                 let before: Vec<&Fitted> = group.iter().map(|i| &fitted[*i]).collect();
                 self.plain(group, &before, peak, STEPS[1])
@@ -238,13 +238,13 @@ impl Fitter<'_> {
         let psi = self.rows(samples);
         let batch = Batch { basis: self.basis.bands(order), lobe: None };
         let places = coefficient_places(order);
-        let mut x = batch.start(self.encoding, &psi);
-        if before.iter().any(|b| !b.coefficients.is_empty()) {
-            let warm = Array2::from_shape_fn(x.dim(), |(q, k)| {
+        let mut x = if before.iter().all(|b| !b.coefficients.is_empty()) {
+            Array2::from_shape_fn((psi.nrows(), batch.unknowns()), |(q, k)| {
                 before[q].coefficients.get(places[k]).copied().unwrap_or(0.0)
-            });
-            batch.take_better(self.encoding, &psi, &warm, &mut x);
-        }
+            })
+        } else {
+            batch.start(self.encoding, &psi)
+        };
         let errors = batch.improve(self.encoding, &psi, steps, &mut x);
         let one = |(q, error): (usize, f32)| Fitted {
             order,

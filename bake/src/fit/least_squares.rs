@@ -1,7 +1,7 @@
 //! Fits of many functions on one set of directions at once: damped Gauss-Newton on the decoded transmittance, each
 //! step solved by conjugate gradients, all sums over directions done as matrix products.
 //!
-//! For values y = B x (B: directions × coefficients) decoded to ψ̂(y) it minimises Σ_ω c (ψ̂ - ψ)², c being [`importance`]
+//! For values y = B x (B: directions × coefficients) decoded to ψ̂(y) it minimises Σ_ω c (ψ̂ - ψ)², c being the importance
 //! of the step before (iteratively reweighted least squares). A step solves
 //! min |g (B d) - (ψ - ψ̂)|² + λ |d|² with g = dψ̂/dy. B has nearly orthogonal columns and g lies within 0..1, so ten
 //! iterations suffice and no normal matrix is ever formed.
@@ -10,27 +10,21 @@
 //! the parts of even and odd bands in the first half, y = E + O there and E - O opposite. Both products therefore take
 //! half the multiplications. Unknowns are kept in that order: even bands, then odd ones.
 
+use super::decoded::{Linear, SLOPE_RIGHT, error, error_along, linearise, slopes};
 use diaphane_formats::encoding::Encoding;
 use diaphane_formats::sh::{coefficient_count, evaluate};
 use glam::DVec3;
 use ndarray::linalg::general_mat_mul;
-use ndarray::{Array2, ArrayView2, ArrayViewMut2, Axis, Slice, Zip};
+use ndarray::{Array2, ArrayView1, ArrayView2, ArrayViewMut1, ArrayViewMut2, Axis, Slice, Zip};
 
 /// Functions fitted together: their values stay in the cache.
 pub(super) const BATCH: usize = 32;
 
-const INNER: usize = 10;
+const INNER: usize = 6;
 const DAMPING: f32 = 1e-4;
 const MOST_DAMPING: f32 = 1.0;
-/// Least |g| where ψ̂ is clamped: small where it is right, larger where a wrong value must be able to move.
-const SLOPE_RIGHT: f32 = 0.02;
-const SLOPE_WRONG: f32 = 0.15;
 /// An improvement smaller than this fraction ends a fit.
 const ENOUGH: f32 = 2e-3;
-/// See [`importance`].
-const DARK_COUNTS: f32 = 0.3;
-/// See [`sensitivity`].
-const BLUR: f32 = 0.1;
 
 /// Harmonics in the first half of the directions, by parity.
 pub(super) struct Basis {
@@ -160,12 +154,14 @@ impl Batch<'_> {
             self.forward(&step, &mut values);
             Zip::from(&mut values).and(weight).for_each(|v, w| *v *= w * w);
             self.backward(&mut values, &mut curved);
+            let mut open = false;
             for q in 0..rows {
                 curved.row_mut(q).scaled_add(ridge[q], &step.row(q));
                 let curvature = step.row(q).dot(&curved.row(q));
-                if !(curvature > 1e-30) || size[q] < 1e-8 * first[q] {
+                if !(curvature > 1e-30) || size[q] < 1e-6 * first[q] {
                     continue;
                 }
+                open = true;
                 let length = size[q] / curvature;
                 x.row_mut(q).scaled_add(length, &step.row(q));
                 gradient.row_mut(q).scaled_add(-length, &curved.row(q));
@@ -174,6 +170,9 @@ impl Batch<'_> {
                 size[q] = next;
                 Zip::from(step.row_mut(q)).and(gradient.row(q)).for_each(|p, g| *p = g + turn * *p);
             }
+            if !open {
+                break;
+            }
         }
         x
     }
@@ -181,34 +180,17 @@ impl Batch<'_> {
     /// A start whose weights are the slopes dψ/dy at the exact values.
     pub fn start(&self, encoding: Encoding, psi: &Array2<f32>) -> Array2<f32> {
         let value = psi.mapv(|psi| encoded(encoding, psi));
-        let weight = value.mapv(|y| decoded(encoding, y).1.abs() + SLOPE_RIGHT);
+        let mut weight = value.clone();
+        for mut row in weight.rows_mut() {
+            row.as_slice_mut().into_iter().for_each(|y| slopes(encoding, y));
+        }
+        weight += SLOPE_RIGHT;
         let right = &weight * &value;
         self.linear(&weight, &right, &vec![DAMPING; psi.nrows()])
     }
 
-    /// Takes the rows of `other` that come closer to ψ than those of `x`.
-    pub fn take_better(
-        &self,
-        encoding: Encoding,
-        psi: &Array2<f32>,
-        other: &Array2<f32>,
-        x: &mut Array2<f32>,
-    ) {
-        let errors = |x: &Array2<f32>| {
-            let mut y = Array2::<f32>::zeros(psi.dim());
-            self.forward(x, &mut y);
-            errors(encoding, psi, &y)
-        };
-        let (own, theirs) = (errors(x), errors(other));
-        for (q, (own, theirs)) in own.into_iter().zip(theirs).enumerate() {
-            if theirs < own {
-                x.row_mut(q).assign(&other.row(q));
-            }
-        }
-    }
-
-    /// Improves `x` in at most `steps` steps; returns each row's root mean square error of ψ, weighted by
-    /// [`importance`].
+    /// Improves `x` in at most `steps` steps; returns each row's root mean square error of ψ, weighted by the
+    /// importance. Rows that are done make room for others, so that the products stay full.
     pub fn improve(
         &self,
         encoding: Encoding,
@@ -218,52 +200,64 @@ impl Batch<'_> {
     ) -> Vec<f32> {
         let (rows, columns) = psi.dim();
         let mut y = Array2::<f32>::zeros(psi.dim());
-        let mut moved = y.clone();
-        let (mut weight, mut right, mut counts) = (y.clone(), y.clone(), y.clone());
         self.forward(x, &mut y);
         let mut damping = vec![DAMPING; rows];
-        let mut done = vec![false; rows];
-        for _ in 0..steps {
-            if done.iter().all(|d| *d) {
+        let mut left = vec![steps; rows];
+        let mut waiting = 0..rows;
+        let mut open: Vec<usize> = Vec::new();
+        loop {
+            open.retain(|q| left[*q] > 0);
+            open.extend(waiting.by_ref().take(BATCH - open.len()).filter(|_| steps > 0));
+            if open.is_empty() {
                 break;
             }
-            let fields = Zip::from(&mut weight).and(&mut right).and(&mut counts).and(&y).and(psi);
-            fields.for_each(|w, r, c, y, psi| {
-                let (value, slope) = decoded(encoding, *y);
-                let residual = psi - value;
-                let floor = if residual.abs() > 1e-3 { SLOPE_WRONG } else { SLOPE_RIGHT };
-                *c = importance(value);
-                let root = c.sqrt();
-                // τ is the one encoding in which ψ falls.
-                *w = root * if encoding == Encoding::Depth { slope.min(-floor) } else { slope.max(floor) };
-                *r = root * residual;
-            });
-            let step = self.linear(&weight, &right, &damping);
-            self.forward(&step, &mut moved);
-            for q in 0..rows {
-                if done[q] {
-                    continue;
-                }
-                let now = right.row(q).dot(&right.row(q));
+            let mut weight = Array2::<f32>::zeros((open.len(), columns));
+            let (mut right, mut counts, mut moved) = (weight.clone(), weight.clone(), weight.clone());
+            for (k, &q) in open.iter().enumerate() {
+                let out = Linear {
+                    weight: slice_mut(weight.row_mut(k)),
+                    right: slice_mut(right.row_mut(k)),
+                    counts: slice_mut(counts.row_mut(k)),
+                };
+                linearise(encoding, slice(y.row(q)), slice(psi.row(q)), out);
+            }
+            let lobe = self.lobe.map(|lobe| lobe.select(Axis(0), &open));
+            let part = Batch { basis: self.basis, lobe: lobe.as_ref() };
+            let damped: Vec<f32> = open.iter().map(|q| damping[*q]).collect();
+            let step = part.linear(&weight, &right, &damped);
+            part.forward(&step, &mut moved);
+            for (k, &q) in open.iter().enumerate() {
+                let now = right.row(k).dot(&right.row(k));
+                let rows = [slice(y.row(q)), slice(moved.row(k))];
                 let along = |length: f32| {
-                    let values = y.row(q).into_iter().zip(moved.row(q)).map(move |(y, d)| y + length * d);
-                    let errors = psi.row(q).into_iter().zip(values).zip(counts.row(q));
-                    errors.map(|((psi, y), c)| c * (decoded(encoding, y).0 - psi).powi(2)).sum::<f32>()
+                    error_along(encoding, rows, length, slice(psi.row(q)), slice(counts.row(k)))
                 };
                 let found = [1.0, 0.4, 0.16].into_iter().map(|l| (l, along(l))).find(|(_, e)| *e < now);
-                if let Some((length, error)) = found {
-                    done[q] = error > now * (1.0 - ENOUGH);
-                    x.row_mut(q).scaled_add(length, &step.row(q));
-                    y.row_mut(q).scaled_add(length, &moved.row(q));
+                let done = if let Some((length, error)) = found {
+                    x.row_mut(q).scaled_add(length, &step.row(k));
+                    y.row_mut(q).scaled_add(length, &moved.row(k));
                     damping[q] = (damping[q] * 0.3).max(DAMPING);
+                    error > now * (1.0 - ENOUGH)
                 } else {
-                    done[q] = damping[q] > MOST_DAMPING;
                     damping[q] *= 30.0;
-                }
+                    damping[q] > 30.0 * MOST_DAMPING
+                };
+                left[q] = if done { 0 } else { left[q] - 1 };
             }
         }
-        errors(encoding, psi, &y).into_iter().map(|e| (e / columns as f32).sqrt()).collect()
+        let error = |q: usize| error(encoding, slice(y.row(q)), slice(psi.row(q)));
+        (0..rows).map(|q| (error(q) / columns as f32).sqrt()).collect()
     }
+}
+
+/// A row of a matrix in standard layout.
+fn slice<'a>(row: ArrayView1<'a, f32>) -> &'a [f32] {
+    row.to_slice().unwrap_or(&[])
+}
+
+/// As above, to be written.
+fn slice_mut<'a>(row: ArrayViewMut1<'a, f32>) -> &'a mut [f32] {
+    row.into_slice().unwrap_or(&mut [])
 }
 
 /// Sums and differences of both halves.
@@ -271,54 +265,9 @@ fn butterfly(left: &mut ArrayViewMut2<'_, f32>, right: &mut ArrayViewMut2<'_, f3
     Zip::from(left).and(right).for_each(|a, b| (*a, *b) = (*a + *b, *a - *b));
 }
 
-/// Squared error of every row, weighted by [`importance`].
-fn errors(encoding: Encoding, psi: &Array2<f32>, y: &Array2<f32>) -> Vec<f32> {
-    let one = |(psi, y): (&f32, &f32)| {
-        let value = decoded(encoding, *y).0;
-        importance(value) * (value - psi).powi(2)
-    };
-    psi.rows().into_iter().zip(y.rows()).map(|(psi, y)| psi.into_iter().zip(y).map(one).sum()).collect()
-}
-
-/// How much a squared error counts where the fit says ψ̂, 1 at ψ̂ = 0.3: between absolute and relative error, because a
-/// scene that is lit through dark parts is looked at as bright as others. It is taken at the fit, not at ψ itself, which
-/// carries the noise of few rays: weights that follow the noise would pull the fit down.
-fn importance(psi: f32) -> f32 {
-    (0.3 + DARK_COUNTS) / (psi + DARK_COUNTS)
-}
-
 /// The stored value of ψ; depths beyond sight are all the same.
 fn encoded(encoding: Encoding, psi: f32) -> f32 {
     encoding.encode(-f64::from(psi.max(1e-5)).ln()) as f32
-}
-
-/// ψ̂ and dψ̂/dy; the slope is 0 where ψ̂ is clamped.
-fn decoded(encoding: Encoding, y: f32) -> (f32, f32) {
-    match encoding {
-        Encoding::Transmittance => (y.clamp(0.0, 1.0), 1.0),
-        Encoding::Depth => {
-            if y <= 0.0 {
-                return (1.0, 0.0);
-            }
-            let psi = (-y).exp();
-            (psi, -psi)
-        }
-        Encoding::Reciprocal { epsilon } | Encoding::Lobe { epsilon } => {
-            if y <= 0.0 {
-                return (0.0, 0.0);
-            }
-            let psi = (epsilon - 1.0 / y).exp();
-            if psi >= 1.0 { (1.0, 0.0) } else { (psi, psi / (y * y)) }
-        }
-    }
-}
-
-/// Squared change of ψ̂, weighted by [`importance`], that a unit change of y makes around y: mean over y and what is
-/// `BLUR` less and more, because errors are large enough to reach brighter places. Never 0, so that clamped values stay
-/// clamped.
-pub(super) fn sensitivity(encoding: Encoding, y: f32) -> f32 {
-    let square = |y: f32| decoded(encoding, y).1.abs().max(SLOPE_RIGHT).powi(2);
-    importance(decoded(encoding, y).0) * (square(y - BLUR) + square(y) + square(y + BLUR)) / 3.0
 }
 
 #[cfg(test)]
@@ -370,7 +319,7 @@ mod tests {
             });
             let mut y = Array2::zeros((7, 200));
             batch.forward(&truth, &mut y);
-            let psi = y.mapv(|y| decoded(encoding, y).0);
+            let psi = y.mapv(|y| (-encoding.decode(y)).exp());
             let mut x = batch.start(encoding, &psi);
             let errors = batch.improve(encoding, &psi, 12, &mut x);
             assert!(errors.iter().all(|e| *e < 2e-3), "{encoding:?} {errors:?}");

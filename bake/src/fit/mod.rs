@@ -2,6 +2,7 @@
 
 mod boundary;
 mod cells;
+mod decoded;
 mod depths;
 mod harmonics;
 mod least_squares;
