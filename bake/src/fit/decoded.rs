@@ -246,7 +246,11 @@ mod tests {
                 assert!((f64::from(r[i]) + root * exact).abs() < 1e-5, "{encoding:?} {}: {}", y[i], r[i]);
                 let slope = (value(y[i] + 1e-3) - value(y[i] - 1e-3)) / 2e-3;
                 let clamped = (value(y[i]) == 0.0 || value(y[i]) == 1.0) || slope.abs() < 0.2;
-                assert!(clamped || (f64::from(w[i]) / root / slope - 1.0).abs() < 0.02, "{encoding:?} {}", y[i]);
+                assert!(
+                    clamped || (f64::from(w[i]) / root / slope - 1.0).abs() < 0.02,
+                    "{encoding:?} {}",
+                    y[i]
+                );
                 sum += f64::from(c[i]) * exact * exact;
             }
             assert!((f64::from(error(encoding, &y, &psi)) / sum - 1.0).abs() < 1e-4);

@@ -11,6 +11,7 @@ use crate::params::{DARK, Params};
 use crate::progress::Stage;
 use crate::samples::{Candidate, Placed};
 use crate::{Error, Prepared, Result};
+use diaphane_formats::approx::exp;
 use diaphane_formats::directions::{even_directions, hash};
 use diaphane_formats::visibility::{DepthRows, project_with};
 use glam::{DVec3, Vec3};
@@ -68,44 +69,29 @@ pub(crate) fn depths(
     let mut boundary = vec![1.0f32; if matched { 0 } else { n * d }];
     let mut outside_votes = vec![0u32; n];
     for (g, group) in forward.chunks(GROUP).enumerate() {
-        let rows: Vec<DepthRows> = group
+        let rows: Vec<Row> = group
             .par_iter()
             .enumerate()
             .map(|(k, axis)| {
                 let points = cells.turn(g * GROUP + k, count);
                 let rows = project_with(shape.mesh, medium.medium, medium.for_rays(), &points, *axis);
                 stage.step(1)?;
-                Ok(rows)
+                Ok(Row::new(&rows, kappa, count))
             })
             .collect::<Result<_>>()?;
-        // Calls `put` with each column, its row and which side of the row it is.
-        let columns = |put: &mut dyn FnMut(usize, &DepthRows, usize)| {
+        let columns = |out: &mut [f32], value: &dyn Fn(&Row, usize) -> f32| {
             for (k, row) in rows.iter().enumerate() {
-                (0..2).for_each(|side| put(side * half + g * GROUP + k, row, side));
+                (0..2).for_each(|side| out[side * half + g * GROUP + k] = value(row, side));
             }
         };
         transmittance.par_chunks_mut(d).zip(&mut outside_votes).enumerate().for_each(|(i, (out, votes))| {
-            let own = i * count..(i + 1) * count;
-            columns(&mut |at, row, side| {
-                let sum: f32 = row.lengths(side)[own.clone()].iter().map(|m| (-kappa * m).exp()).sum();
-                out[at] = sum / count as f32;
-                *votes += row.winding[side][own.clone()].iter().filter(|w| **w <= 0).count() as u32;
-            });
+            columns(out, &|row, side| row.psi[side][i]);
+            *votes += rows.iter().map(|row| u32::from(row.outside[i])).sum::<u32>();
         });
-        if !matched {
-            boundary.par_chunks_mut(d).enumerate().for_each(|(i, out)| {
-                columns(&mut |at, row, side| {
-                    let (mut through, mut all) = (0.0f32, 0.0f32);
-                    for q in i * count..(i + 1) * count {
-                        // A little more than ψ, so that darkness divides no zero by zero.
-                        let psi = (-kappa * row.lengths(side)[q]).exp() + 1e-6;
-                        through += psi * row.boundary[side][q];
-                        all += psi;
-                    }
-                    out[at] = through / all;
-                });
-            });
-        }
+        boundary
+            .par_chunks_mut(d)
+            .enumerate()
+            .for_each(|(i, out)| columns(out, &|row, side| row.through[side][i]));
     }
     let keep: Vec<bool> = (0..n)
         .into_par_iter()
@@ -144,6 +130,44 @@ pub(crate) fn depths(
         dark_candidates: placed.dark,
         rays: (n * count * d) as u64,
     })
+}
+
+/// What samples see along one direction and its opposite.
+struct Row {
+    /// Mean ψ over the points.
+    psi: [Vec<f32>; 2],
+    /// Mean Fresnel transmittance weighted by ψ; empty when index matched.
+    through: [Vec<f32>; 2],
+    /// How often one of the points seems to lie outside.
+    outside: Vec<u16>,
+}
+
+impl Row {
+    /// From the depths of `count` points for each sample, at extinction `kappa`.
+    fn new(rows: &DepthRows, kappa: f32, count: usize) -> Self {
+        let psi = [0, 1].map(|side| rows.lengths(side).iter().map(|m| exp(-kappa * m)).collect::<Vec<f32>>());
+        let through = [0, 1].map(|side| {
+            let points = psi[side].chunks_exact(count).zip(rows.boundary[side].chunks_exact(count));
+            let mean = |(psi, boundary): (&[f32], &[f32])| {
+                // A little more than ψ, so that darkness divides no zero by zero.
+                let (mut through, mut all) = (0.0f32, 0.0f32);
+                for (psi, boundary) in psi.iter().zip(boundary) {
+                    through += (psi + 1e-6) * boundary;
+                    all += psi + 1e-6;
+                }
+                through / all
+            };
+            points.map(mean).collect()
+        });
+        let sides = rows.winding[0].chunks_exact(count).zip(rows.winding[1].chunks_exact(count));
+        let not_inside = |windings: &[i8]| windings.iter().filter(|w| **w <= 0).count() as u16;
+        Self {
+            psi: psi
+                .map(|psi| psi.chunks_exact(count).map(|p| p.iter().sum::<f32>() / count as f32).collect()),
+            through,
+            outside: sides.map(|(a, b)| not_inside(a) + not_inside(b)).collect(),
+        }
+    }
 }
 
 /// Towards the nearest point of the mesh, or out of the triangle that the sample lies on.

@@ -100,7 +100,9 @@ impl Rounding {
                 changed |= code != codes[k];
                 (codes[k], now[k]) = (code, value);
                 let weights = sum.iter().zip(difference);
-                for ((b, (own, other)), (sum, difference)) in b.iter().zip(own.iter_mut().zip(other)).zip(weights) {
+                for ((b, (own, other)), (sum, difference)) in
+                    b.iter().zip(own.iter_mut().zip(other)).zip(weights)
+                {
                     *own += step * b * sum;
                     *other += step * b * difference;
                 }

@@ -1,0 +1,195 @@
+//! Depth of many points along one direction and its opposite at once, by projecting the mesh.
+//!
+//! Points and triangles are projected onto the plane across ω; points are bucketed in a grid; every triangle adds
+//! its signed crossing to the points that it covers. For a homogeneous medium the signed sum of z_triangle - z_point
+//! is the density length (exits positive, entries negative): exact, and nothing is sorted. Otherwise each crossing
+//! adds the signed running integral of ρ. Edge functions are antisymmetric with a fixed rule for ties (no fused
+//! multiply-add), so no winding is ever wrong because two neighbours disagree. Results do not depend on threads: each
+//! direction is one task.
+
+mod buckets;
+mod cover;
+
+use crate::fresnel;
+use crate::medium::{Medium, RunningIntegral, SampledDensity};
+use crate::mesh::Mesh;
+use buckets::Buckets;
+use cover::{Cover, Crossings, PADDING, Visit, add_to, lanes, load};
+use glam::DVec3;
+use pulp::{Arch, Simd};
+use std::ops::Range;
+
+/// Depths of all points along one direction.
+#[derive(Clone, Debug)]
+pub struct DepthRows {
+    /// m of each point along ω.
+    pub forward: Vec<f32>,
+    /// m of each point along -ω.
+    pub backward: Vec<f32>,
+    /// Fresnel transmittance products along ω and -ω; empty when the boundary is index matched.
+    pub boundary: [Vec<f32>; 2],
+    /// Winding number seen along ω and along -ω: 1 for points inside a clean mesh.
+    pub winding: [Vec<i8>; 2],
+}
+
+impl DepthRows {
+    /// m of each point along ω (side 0) or -ω (side 1).
+    pub fn lengths(&self, side: usize) -> &[f32] {
+        if side == 0 { &self.forward } else { &self.backward }
+    }
+}
+
+/// Depths of `points` through `mesh` along the unit vector `direction` and its opposite, with the medium's own
+/// integrals along each ray.
+pub fn project(mesh: &Mesh, medium: &Medium, points: &[DVec3], direction: DVec3) -> DepthRows {
+    project_with(mesh, medium, None, points, direction)
+}
+
+/// As [`project`], with the density taken from a sampled field where one is given (for fields without closed form).
+pub fn project_with(
+    mesh: &Mesh,
+    medium: &Medium,
+    sampled: Option<&SampledDensity>,
+    points: &[DVec3],
+    direction: DVec3,
+) -> DepthRows {
+    let (u_axis, v_axis) = direction.any_orthonormal_pair();
+    let frame = [u_axis, v_axis, direction];
+    let buckets = &Buckets::new(points, &frame);
+    let corners: &[[f64; 3]] =
+        &mesh.positions.iter().map(|p| frame.map(|axis| p.dot(axis))).collect::<Vec<_>>();
+    let (arch, triangles) = (Arch::new(), &mesh.triangles[..]);
+    let padded = points.len() + PADDING;
+    let mut sums = Sums {
+        depth: [vec![0.0; padded], vec![0.0; padded]],
+        winding: [vec![0.0; padded], vec![0.0; padded]],
+    };
+    let matched = medium.ior() == 1.0;
+    let (mut boundary, mut scale) = ([vec![], vec![]], 1.0);
+    if medium.is_homogeneous() && matched {
+        let mut visit = Even { z: &buckets.z, sums };
+        arch.dispatch(Crossings { corners, triangles, buckets, visit: &mut visit });
+        (sums, scale) = (visit.sums, medium.uniform_density());
+    } else {
+        let running = sampled.map(|s| s.running(direction));
+        let along = Along {
+            medium,
+            direction,
+            points,
+            at_point: running.iter().flat_map(|r| points.iter().map(|p| r.at(*p))).collect(),
+            running,
+        };
+        let ones = || vec![1.0; if matched { 0 } else { points.len() }];
+        let mut visit =
+            Any { along, mesh, buckets, sums, boundary: [ones(), ones()], through: (usize::MAX, 1.0) };
+        arch.dispatch(Crossings { corners, triangles, buckets, visit: &mut visit });
+        (sums, boundary) = (visit.sums, visit.boundary);
+    }
+    let length = |m: f64| (m * scale).max(0.0) as f32;
+    let [forward, backward] = sums.depth.map(|values| buckets.unsorted(&values, length));
+    DepthRows {
+        forward,
+        backward,
+        boundary: boundary.map(|values| if matched { values } else { buckets.unsorted(&values, |t| t) }),
+        winding: sums.winding.map(|values| buckets.unsorted(&values, |w| w as i8)),
+    }
+}
+
+/// Sums of sorted points along ω and -ω, padded as the points are.
+struct Sums {
+    depth: [Vec<f64>; 2],
+    winding: [Vec<f64>; 2],
+}
+
+/// Where the medium is homogeneous and the boundary index matched: lengths alone, all lanes at once. Lanes that are not
+/// covered add 0.
+struct Even<'a> {
+    z: &'a [f64],
+    sums: Sums,
+}
+
+impl Visit for Even<'_> {
+    #[inline(always)]
+    fn add<S: Simd>(&mut self, simd: S, _: usize, range: Range<usize>, cover: Cover<S>) {
+        let zero = simd.splat_f64s(0.0);
+        let count = simd.splat_f64s(range.len() as f64);
+        let own = simd.less_than_f64s(lanes(simd), count);
+        let sign = simd.select_f64s(own, cover.sign, zero);
+        let none = simd.equal_f64s(sign, zero);
+        let distance = simd.sub_f64s(cover.z, load(simd, self.z, range.start));
+        let length = simd.select_f64s(none, zero, simd.mul_f64s(sign, distance));
+        let behind = simd.less_than_f64s(distance, zero);
+        let pick = |front: S::f64s, back: S::f64s| simd.select_f64s(behind, back, front);
+        let at = range.start;
+        let Sums { depth, winding } = &mut self.sums;
+        add_to(simd, &mut depth[0], at, pick(length, zero));
+        add_to(simd, &mut depth[1], at, pick(zero, length));
+        // Seen along -ω both the distance and the sign of the crossing turn round.
+        add_to(simd, &mut winding[0], at, pick(sign, zero));
+        add_to(simd, &mut winding[1], at, pick(zero, simd.neg_f64s(sign)));
+    }
+}
+
+/// Integrals of the density along ω from one of the points.
+struct Along<'a> {
+    medium: &'a Medium,
+    direction: DVec3,
+    points: &'a [DVec3],
+    running: Option<RunningIntegral>,
+    /// The running integral at each point.
+    at_point: Vec<f64>,
+}
+
+impl Along<'_> {
+    /// ∫ρ from point `i` to `distance`, both of any sign.
+    fn integral(&self, i: usize, distance: f64) -> f64 {
+        let origin = self.points[i];
+        if let Some(running) = &self.running {
+            return running.at(origin + self.direction * distance) - self.at_point[i];
+        }
+        let towards = self.direction * distance.signum();
+        distance.signum() * self.medium.density_length(origin, towards, 0.0, distance.abs())
+    }
+}
+
+/// Any medium and boundary, one crossing after the other.
+struct Any<'a> {
+    along: Along<'a>,
+    mesh: &'a Mesh,
+    buckets: &'a Buckets,
+    sums: Sums,
+    /// Products of Fresnel transmittances; empty when index matched.
+    boundary: [Vec<f32>; 2],
+    /// The last triangle and its transmittance.
+    through: (usize, f32),
+}
+
+impl Visit for Any<'_> {
+    #[inline(always)]
+    fn add<S: Simd>(&mut self, _: S, triangle: usize, range: Range<usize>, cover: Cover<S>) {
+        let signs: &[f64] = bytemuck::cast_slice(std::slice::from_ref(&cover.sign));
+        let heights: &[f64] = bytemuck::cast_slice(std::slice::from_ref(&cover.z));
+        for (k, (sign, z)) in range.zip(signs.iter().zip(heights)) {
+            if *sign != 0.0 {
+                self.cross(triangle, k, *z, *sign);
+            }
+        }
+    }
+}
+
+impl Any<'_> {
+    fn cross(&mut self, triangle: usize, k: usize, z: f64, sign: f64) {
+        let distance = z - self.buckets.z[k];
+        // As in `Even`.
+        let side = usize::from(distance < 0.0);
+        self.sums.winding[side][k] += if side == 0 { sign } else { -sign };
+        self.sums.depth[side][k] += sign * self.along.integral(self.buckets.order[k] as usize, distance);
+        if !self.boundary[side].is_empty() {
+            if self.through.0 != triangle {
+                let cosine = self.mesh.area_normal(triangle).normalize_or_zero().dot(self.along.direction);
+                self.through = (triangle, fresnel::transmittance(cosine, self.along.medium.ior()) as f32);
+            }
+            self.boundary[side][k] *= self.through.1;
+        }
+    }
+}
