@@ -4,7 +4,7 @@ use crate::inspect;
 use crate::terminal::Bars;
 use anyhow::{Context, bail};
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use diaphane_bake::params::{Params, Preset, Representation};
+use diaphane_bake::params::{Params, Preset, Representation, Visibility};
 use diaphane_bake::{Input, bake};
 use diaphane_formats::{asset, files, material, mesh};
 use std::path::{Path, PathBuf};
@@ -61,7 +61,7 @@ struct BakeArguments {
     /// Directions in which the optical depth of each sample is computed (rounded up to an even number).
     #[arg(long, value_name = "D")]
     directions: Option<usize>,
-    /// Points around each sample that one direction sees; others see other points, four times as many in all.
+    /// Points around each sample that one direction sees; others see other points, 16 in all.
     #[arg(long, value_name = "P")]
     points: Option<usize>,
     /// Most bands of spherical harmonics, 1 to 14; a sample gets as few as it needs. Not given, samples in need get up to
@@ -74,6 +74,9 @@ struct BakeArguments {
     /// Most times that all samples are moved and resized to lower the error of rays (0: never).
     #[arg(long, value_name = "ROUNDS")]
     refine: Option<usize>,
+    /// How optical depths are found; the result is the same.
+    #[arg(long, value_enum, default_value_t = VisibilityName::Auto)]
+    visibility: VisibilityName,
     /// What the harmonics represent.
     #[arg(long, value_enum, default_value_t = EncodingName::Lobe)]
     encoding: EncodingName,
@@ -101,10 +104,20 @@ struct BakeArguments {
 enum PresetName {
     /// 5,000 samples, 96 directions, at most 6 bands.
     Draft,
-    /// 50,000 samples, 768 directions, at most 10 bands.
+    /// 50,000 samples, 1,024 directions, at most 10 bands.
     Standard,
     /// 50,000 samples, refined, 1,536 directions, at most 14 bands.
     Fine,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum VisibilityName {
+    /// Whichever should be faster.
+    Auto,
+    /// Triangles are projected onto the samples.
+    Project,
+    /// Rays are traced through a box hierarchy: the oracle.
+    Trace,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -137,6 +150,11 @@ impl BakeArguments {
         params.seed = self.seed.unwrap_or(params.seed);
         params.certificate = !self.no_certificate;
         params.max_error = self.max_error;
+        params.visibility = match self.visibility {
+            VisibilityName::Auto => Visibility::Auto,
+            VisibilityName::Project => Visibility::Project,
+            VisibilityName::Trace => Visibility::Trace,
+        };
         params.representation = match self.encoding {
             EncodingName::Reciprocal => Representation::Reciprocal,
             EncodingName::Lobe => Representation::Lobe,

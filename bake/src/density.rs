@@ -8,9 +8,8 @@ use crate::field::Shape;
 use crate::layers::Layer;
 use crate::params::{DENSITY_DIRECTIONS, Params};
 use crate::progress::Stage;
-use crate::{Prepared, Result};
+use crate::{Prepared, Result, visibility};
 use diaphane_formats::directions::{even_directions, hash};
-use diaphane_formats::visibility::project_with;
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -34,8 +33,7 @@ pub(crate) fn evaluate(
             points.push(*p + *n * layer.thickness);
         }
     }
-    let count = DENSITY_DIRECTIONS.min(params.directions).next_multiple_of(2);
-    let values = fluence(shape, medium, &points, count, hash(params.seed, 11), stage)?;
+    let values = fluence(shape, medium, &points, params, hash(params.seed, 11), stage)?;
     let mut next = values.chunks_exact(2);
     let (mut top, mut bottom) = (Vec::new(), Vec::new());
     for layer in layers {
@@ -46,17 +44,19 @@ pub(crate) fn evaluate(
     Ok(LayerFluence { top, bottom })
 }
 
-/// Φ/4π at `points` from `count` (even) directions, at the reference extinction. Points outside see the depth of
+/// Φ/4π at `points` at the reference extinction. Points outside see the depth of
 /// what lies in front of them, which is what a sample near them would see.
 fn fluence(
     shape: &Shape<'_>,
     medium: &Prepared<'_>,
     points: &[DVec3],
-    count: usize,
+    params: &Params,
     seed: u64,
     stage: Stage<'_>,
 ) -> Result<Vec<f32>> {
     let kappa = medium.medium.reference_extinction() as f32;
+    let count = DENSITY_DIRECTIONS.min(params.directions).next_multiple_of(2);
+    let how = params.visibility;
     let axes: Vec<DVec3> = even_directions(count, seed).into_iter().step_by(2).collect();
     stage.announce(axes.len());
     let mut sum = vec![0.0f32; points.len()];
@@ -65,7 +65,7 @@ fn fluence(
         let rows: Vec<_> = group
             .par_iter()
             .map(|axis| {
-                let rows = project_with(shape.mesh, medium.medium, medium.for_rays(), points, *axis);
+                let rows = visibility::depths(shape, medium, how, points, *axis);
                 stage.step(1)?;
                 Ok(rows)
             })

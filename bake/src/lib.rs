@@ -20,6 +20,7 @@ pub mod progress;
 mod refine;
 pub mod report;
 mod samples;
+mod visibility;
 
 pub use error::{Error, Result};
 

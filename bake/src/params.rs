@@ -25,6 +25,8 @@ pub struct Params {
     pub seed: u64,
     /// Where samples may stand.
     pub placement: Placement,
+    /// How depths towards all directions are found.
+    pub visibility: Visibility,
     /// What the harmonics represent.
     pub representation: Representation,
     /// Full width at half maximum of a kernel in disk radii.
@@ -65,6 +67,17 @@ pub enum Representation {
     Lobe,
 }
 
+/// How the optical depth of many points along one direction is found; the result is the same.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Visibility {
+    /// Whichever should be faster for so many points and triangles.
+    Auto,
+    /// Every triangle is projected onto the points ([`diaphane_formats::visibility::project()`]).
+    Project,
+    /// Rays through a box hierarchy ([`diaphane_formats::visibility::trace`]): the oracle.
+    Trace,
+}
+
 /// Where samples may stand.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Placement {
@@ -103,6 +116,7 @@ impl Params {
             light_error,
             seed: 1,
             placement: Placement::Boundary,
+            visibility: Visibility::Auto,
             representation: Representation::Lobe,
             width_factor: 1.35,
             refine: if preset == Preset::Fine { 4 } else { 0 },

@@ -33,6 +33,8 @@ pub struct Report {
     pub sh_order: usize,
     /// Depths computed for the samples.
     pub rays: u64,
+    /// How they were found: `project` or `trace`.
+    pub visibility: &'static str,
     /// Seconds of each stage, over all bakes that a wanted error took, in order of name; `total` is their sum.
     pub seconds: BTreeMap<String, f64>,
     /// Size of the asset file.
@@ -85,6 +87,7 @@ impl Report {
             directions: lit.directions.len(),
             sh_order: params.order,
             rays: lit.rays,
+            visibility: lit.visibility,
             seconds,
             bytes: encode(asset).map_or(0, |b| b.len()),
             seed: params.seed,

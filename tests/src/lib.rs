@@ -13,4 +13,5 @@ pub mod range;
 pub mod reference;
 pub mod report;
 pub mod rivals;
+pub mod speed;
 pub mod sweep;

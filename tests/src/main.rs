@@ -33,6 +33,8 @@ enum Command {
     Range(commands::range::Arguments),
     /// Measure run time against error, beside other methods
     Sweep(Box<commands::sweep::Arguments>),
+    /// Measure how fast bakes are, as ratios within one run
+    BakeSpeed(commands::bake_speed::Arguments),
 }
 
 fn main() -> ExitCode {
@@ -55,6 +57,7 @@ fn main() -> ExitCode {
         Command::Demo(a) => commands::demo::run(&a),
         Command::Range(a) => commands::range::run(&a),
         Command::Sweep(a) => commands::sweep::run(&a),
+        Command::BakeSpeed(a) => commands::bake_speed::run(&a),
     };
     match result {
         Ok(true) => ExitCode::SUCCESS,

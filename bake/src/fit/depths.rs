@@ -1,4 +1,4 @@
-//! Optical depth of every sample in every direction, by projecting the mesh along each.
+//! Optical depth of every sample in every direction, all samples along one direction at a time.
 //!
 //! ψ of a sample is a mean over its cell. One direction sees a few of the cell's points, the next one others: the fit
 //! over all directions is smooth, so that few rays each average the cell as well as many would (measured on the layered
@@ -7,13 +7,13 @@
 
 use super::cells::Cells;
 use crate::field::Shape;
-use crate::params::{DARK, Params};
+use crate::params::{DARK, Params, Visibility};
 use crate::progress::Stage;
 use crate::samples::{Candidate, Placed};
-use crate::{Error, Prepared, Result};
+use crate::{Error, Prepared, Result, visibility};
 use diaphane_formats::approx::exp;
 use diaphane_formats::directions::{even_directions, hash};
-use diaphane_formats::visibility::{DepthRows, project_with};
+use diaphane_formats::visibility::DepthRows;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
@@ -36,6 +36,8 @@ pub(crate) struct Lit {
     pub snapped: usize,
     pub dark_candidates: usize,
     pub rays: u64,
+    /// How depths were found.
+    pub visibility: &'static str,
 }
 
 /// Points of a cell, of which every direction sees its share.
@@ -74,7 +76,7 @@ pub(crate) fn depths(
             .enumerate()
             .map(|(k, axis)| {
                 let points = cells.turn(g * GROUP + k, count);
-                let rows = project_with(shape.mesh, medium.medium, medium.for_rays(), &points, *axis);
+                let rows = visibility::depths(shape, medium, params.visibility, &points, *axis);
                 stage.step(1)?;
                 Ok(Row::new(&rows, kappa, count))
             })
@@ -129,6 +131,10 @@ pub(crate) fn depths(
         snapped: placed.snapped,
         dark_candidates: placed.dark,
         rays: (n * count * d) as u64,
+        visibility: match visibility::chosen(params.visibility, n * count, shape.mesh.triangles.len()) {
+            Visibility::Trace => "trace",
+            _ => "project",
+        },
     })
 }
 

@@ -10,34 +10,16 @@
 mod buckets;
 mod cover;
 
+use super::DepthRows;
+use super::along::Along;
 use crate::fresnel;
-use crate::medium::{Medium, RunningIntegral, SampledDensity};
+use crate::medium::{Medium, SampledDensity};
 use crate::mesh::Mesh;
 use buckets::Buckets;
 use cover::{Cover, Crossings, PADDING, Visit, add_to, lanes, load};
 use glam::DVec3;
 use pulp::{Arch, Simd};
 use std::ops::Range;
-
-/// Depths of all points along one direction.
-#[derive(Clone, Debug)]
-pub struct DepthRows {
-    /// m of each point along ω.
-    pub forward: Vec<f32>,
-    /// m of each point along -ω.
-    pub backward: Vec<f32>,
-    /// Fresnel transmittance products along ω and -ω; empty when the boundary is index matched.
-    pub boundary: [Vec<f32>; 2],
-    /// Winding number seen along ω and along -ω: 1 for points inside a clean mesh.
-    pub winding: [Vec<i8>; 2],
-}
-
-impl DepthRows {
-    /// m of each point along ω (side 0) or -ω (side 1).
-    pub fn lengths(&self, side: usize) -> &[f32] {
-        if side == 0 { &self.forward } else { &self.backward }
-    }
-}
 
 /// Depths of `points` through `mesh` along the unit vector `direction` and its opposite, with the medium's own
 /// integrals along each ray.
@@ -71,14 +53,7 @@ pub fn project_with(
         arch.dispatch(Crossings { corners, triangles, buckets, visit: &mut visit });
         (sums, scale) = (visit.sums, medium.uniform_density());
     } else {
-        let running = sampled.map(|s| s.running(direction));
-        let along = Along {
-            medium,
-            direction,
-            points,
-            at_point: running.iter().flat_map(|r| points.iter().map(|p| r.at(*p))).collect(),
-            running,
-        };
+        let along = Along::new(medium, sampled, points, direction);
         let ones = || vec![1.0; if matched { 0 } else { points.len() }];
         let mut visit =
             Any { along, mesh, buckets, sums, boundary: [ones(), ones()], through: (usize::MAX, 1.0) };
@@ -130,28 +105,6 @@ impl Visit for Even<'_> {
     }
 }
 
-/// Integrals of the density along ω from one of the points.
-struct Along<'a> {
-    medium: &'a Medium,
-    direction: DVec3,
-    points: &'a [DVec3],
-    running: Option<RunningIntegral>,
-    /// The running integral at each point.
-    at_point: Vec<f64>,
-}
-
-impl Along<'_> {
-    /// ∫ρ from point `i` to `distance`, both of any sign.
-    fn integral(&self, i: usize, distance: f64) -> f64 {
-        let origin = self.points[i];
-        if let Some(running) = &self.running {
-            return running.at(origin + self.direction * distance) - self.at_point[i];
-        }
-        let towards = self.direction * distance.signum();
-        distance.signum() * self.medium.density_length(origin, towards, 0.0, distance.abs())
-    }
-}
-
 /// Any medium and boundary, one crossing after the other.
 struct Any<'a> {
     along: Along<'a>,
@@ -186,8 +139,8 @@ impl Any<'_> {
         self.sums.depth[side][k] += sign * self.along.integral(self.buckets.order[k] as usize, distance);
         if !self.boundary[side].is_empty() {
             if self.through.0 != triangle {
-                let cosine = self.mesh.area_normal(triangle).normalize_or_zero().dot(self.along.direction);
-                self.through = (triangle, fresnel::transmittance(cosine, self.along.medium.ior()) as f32);
+                let cosine = self.mesh.area_normal(triangle).normalize_or_zero().dot(self.along.direction());
+                self.through = (triangle, fresnel::transmittance(cosine, self.along.ior()) as f32);
             }
             self.boundary[side][k] *= self.through.1;
         }
