@@ -1,7 +1,7 @@
 //! Spherical harmonics of the boundary's Fresnel transmittance, where the boundary is not index matched.
 
 use super::depths::Lit;
-use super::least_squares::{BATCH, Basis, Batch, coefficient_places, in_order};
+use super::least_squares::{ALONE, BATCH, Basis, Batch, coefficient_places, in_order};
 use crate::params::Params;
 use diaphane_formats::harmonics::{Coefficients, Harmonics};
 use ndarray::Array2;
@@ -32,7 +32,7 @@ pub(super) fn boundary(lit: &Lit, basis: &Basis, params: &Params) -> Harmonics {
             let shape = (through.len() / columns, columns);
             let weight = Array2::from_shape_fn(shape, |(q, d)| psi[q * columns + d] + 0.02);
             let right = Array2::from_shape_fn(shape, |(q, d)| through[q * columns + d] * weight[[q, d]]);
-            let x = batch.linear(&weight, &right, &vec![1e-4; shape.0]);
+            let x = batch.linear(&weight, &right, &vec![1e-4; shape.0], ALONE);
             x.rows().into_iter().flat_map(|x| in_order(&places, x.iter())).collect()
         })
         .collect();

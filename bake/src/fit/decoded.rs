@@ -13,7 +13,7 @@ pub(super) const LANES: usize = 16;
 pub(super) const SLOPE_RIGHT: f32 = 0.02;
 const SLOPE_WRONG: f32 = 0.15;
 /// See [`importance`].
-const DARK_COUNTS: f32 = 0.3;
+const DARK_COUNTS: f32 = 1.0;
 /// See [`sensitivities`].
 const BLUR: f32 = 0.1;
 

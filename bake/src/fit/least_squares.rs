@@ -20,7 +20,9 @@ use ndarray::{Array2, ArrayView1, ArrayView2, ArrayViewMut1, ArrayViewMut2, Axis
 /// Functions fitted together: their values stay in the cache.
 pub(super) const BATCH: usize = 32;
 
-const INNER: usize = 6;
+/// Iterations of a step, and of a linear problem that is solved once.
+pub(super) const INNER: usize = 6;
+pub(super) const ALONE: usize = 12;
 const DAMPING: f32 = 1e-4;
 const MOST_DAMPING: f32 = 1.0;
 /// An improvement smaller than this fraction ends a fit.
@@ -136,7 +138,13 @@ impl Batch<'_> {
     }
 
     /// Minimises |weight (B x) - right|² + λ mean(weight²) |x|² for every row.
-    pub fn linear(&self, weight: &Array2<f32>, right: &Array2<f32>, damping: &[f32]) -> Array2<f32> {
+    pub fn linear(
+        &self,
+        weight: &Array2<f32>,
+        right: &Array2<f32>,
+        damping: &[f32],
+        iterations: usize,
+    ) -> Array2<f32> {
         let rows = weight.nrows();
         let shape = (rows, self.unknowns());
         let mut x = Array2::<f32>::zeros(shape);
@@ -150,7 +158,7 @@ impl Batch<'_> {
             (0..rows).map(|q| damping[q] * square(weight, q) / (4.0 * std::f32::consts::PI)).collect();
         let first: Vec<f32> = (0..rows).map(|q| square(&gradient, q)).collect();
         let mut size = first.clone();
-        for _ in 0..INNER {
+        for _ in 0..iterations {
             self.forward(&step, &mut values);
             Zip::from(&mut values).and(weight).for_each(|v, w| *v *= w * w);
             self.backward(&mut values, &mut curved);
@@ -186,7 +194,7 @@ impl Batch<'_> {
         }
         weight += SLOPE_RIGHT;
         let right = &weight * &value;
-        self.linear(&weight, &right, &vec![DAMPING; psi.nrows()])
+        self.linear(&weight, &right, &vec![DAMPING; psi.nrows()], INNER)
     }
 
     /// Improves `x` in at most `steps` steps; returns each row's root mean square error of ψ, weighted by the
@@ -224,7 +232,7 @@ impl Batch<'_> {
             let lobe = self.lobe.map(|lobe| lobe.select(Axis(0), &open));
             let part = Batch { basis: self.basis, lobe: lobe.as_ref() };
             let damped: Vec<f32> = open.iter().map(|q| damping[*q]).collect();
-            let step = part.linear(&weight, &right, &damped);
+            let step = part.linear(&weight, &right, &damped, INNER);
             part.forward(&step, &mut moved);
             for (k, &q) in open.iter().enumerate() {
                 let now = right.row(k).dot(&right.row(k));
@@ -332,7 +340,7 @@ mod tests {
         let batch = Batch { basis: basis.bands(2), lobe: None };
         let weight = Array2::from_shape_fn((1, 60), |(_, d)| 0.5 + 0.4 * (d as f32).sin());
         let right = Array2::from_shape_fn((1, 60), |(_, d)| (3.0 * d as f32).cos());
-        let x = batch.linear(&weight, &right, &[0.0]);
+        let x = batch.linear(&weight, &right, &[0.0], INNER);
         // Four unknowns, fewer than iterations: the gradient of the least squares vanishes at their minimum.
         let mut values = Array2::zeros((1, 60));
         batch.forward(&x, &mut values);
