@@ -1,10 +1,12 @@
 //! Arguments and what they do.
 
+use crate::batch::{self, BatchArguments};
 use crate::inspect;
 use crate::terminal::Bars;
 use anyhow::{Context, bail};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use diaphane_bake::params::{Params, Preset, Representation, Visibility};
+use diaphane_bake::report::Report;
 use diaphane_bake::{Input, bake};
 use diaphane_formats::{asset, files, material, mesh};
 use std::path::{Path, PathBuf};
@@ -20,7 +22,8 @@ use std::path::{Path, PathBuf};
         diaphane-bake bunny.obj --material wax.material.toml --output bunny.dph --preset draft\n  \
         diaphane-bake bunny.obj --material wax.material.toml --output bunny.dph --samples 100000 --report bake.json\n  \
         diaphane-bake bunny.obj --material wax.material.toml --output bunny.dph --max-error 0.03\n  \
-        diaphane-bake inspect bunny.dph --json"
+        diaphane-bake inspect bunny.dph --json\n  \
+        diaphane-bake batch assets.toml"
 )]
 pub struct Arguments {
     #[command(subcommand)]
@@ -39,6 +42,8 @@ enum Command {
         #[arg(long)]
         json: bool,
     },
+    /// Bakes a list, one after the other; a failure does not stop the rest.
+    Batch(BatchArguments),
 }
 
 #[derive(Args)]
@@ -165,15 +170,43 @@ impl BakeArguments {
     }
 }
 
-/// Runs the command line.
-pub fn run(arguments: Arguments) -> anyhow::Result<()> {
-    match arguments.command {
-        Some(Command::Inspect { asset, json }) => inspect::show(&asset, json),
-        None => run_bake(&arguments.bake),
+impl Arguments {
+    /// The asset to write; empty for other commands than a bake.
+    pub fn output(&self) -> &Path {
+        self.bake.output.as_deref().unwrap_or(Path::new(""))
     }
 }
 
-fn run_bake(arguments: &BakeArguments) -> anyhow::Result<()> {
+/// Runs the command line.
+pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
+    match &arguments.command {
+        Some(Command::Inspect { asset, json }) => inspect::show(asset, *json),
+        Some(Command::Batch(batch)) => batch::run(batch),
+        None => {
+            use_threads(arguments.bake.threads)?;
+            let bars = Bars::new(arguments.bake.quiet);
+            bars.cancel_on_interrupt().context("cannot listen for Ctrl-C")?;
+            let report = run_bake(arguments, &bars)?;
+            if !arguments.bake.quiet {
+                println!("{}", summary(arguments.output(), &report));
+            }
+            Ok(())
+        }
+    }
+}
+
+/// Bakes with so many threads from now on.
+pub fn use_threads(threads: Option<usize>) -> anyhow::Result<()> {
+    let Some(threads) = threads else { return Ok(()) };
+    if !(1..=1024).contains(&threads) {
+        bail!("--threads must lie within 1..1024, not {threads}");
+    }
+    rayon::ThreadPoolBuilder::new().num_threads(threads).build_global().context("cannot start the threads")
+}
+
+/// One bake.
+pub fn run_bake(arguments: &Arguments, bars: &Bars) -> anyhow::Result<Report> {
+    let arguments = &arguments.bake;
     let (Some(mesh_path), Some(material_path), Some(output)) =
         (&arguments.mesh, &arguments.material, &arguments.output)
     else {
@@ -190,15 +223,6 @@ fn run_bake(arguments: &BakeArguments) -> anyhow::Result<()> {
         files::require_writable(report)?;
     }
     files::require_writable(output)?;
-    if let Some(threads) = arguments.threads {
-        if !(1..=1024).contains(&threads) {
-            bail!("--threads must lie within 1..1024, not {threads}");
-        }
-        rayon::ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .build_global()
-            .context("cannot start the threads")?;
-    }
     let medium = material::load(material_path)?;
     let (mesh, mesh_report) = mesh::load_obj(mesh_path)?;
     if !arguments.quiet {
@@ -206,8 +230,6 @@ fn run_bake(arguments: &BakeArguments) -> anyhow::Result<()> {
             eprintln!("{}: {line}", mesh_path.display());
         }
     }
-    let bars = Bars::new(arguments.quiet);
-    bars.cancel_on_interrupt().context("cannot listen for Ctrl-C")?;
     let input = Input {
         mesh: &mesh,
         mesh_report: &mesh_report,
@@ -215,7 +237,7 @@ fn run_bake(arguments: &BakeArguments) -> anyhow::Result<()> {
         mesh_name: file_name(mesh_path),
         material_name: file_name(material_path),
     };
-    let result = bake(&input, &arguments.params(), &bars);
+    let result = bake(&input, &arguments.params(), bars);
     bars.finish();
     let (baked, report) = result?;
     asset::write(output, &baked)?;
@@ -226,19 +248,21 @@ fn run_bake(arguments: &BakeArguments) -> anyhow::Result<()> {
     for line in &report.shortfalls {
         eprintln!("warning: {line}");
     }
-    if !arguments.quiet {
-        println!(
-            "{}: {} samples, {} directions, {} bands, {:.1} MB, {:.1} s",
-            output.display(),
-            report.samples,
-            report.directions,
-            report.sh_order,
-            report.bytes as f64 / 1e6,
-            report.seconds.get("total").copied().unwrap_or_default()
-        );
-        println!("error: {}", inspect::certified(report.certificate.as_ref()));
-    }
-    Ok(())
+    Ok(report)
+}
+
+/// Two lines on a bake.
+fn summary(output: &Path, report: &Report) -> String {
+    format!(
+        "{}: {} samples, {} directions, {} bands, {:.1} MB, {:.1} s\nerror: {}",
+        output.display(),
+        report.samples,
+        report.directions,
+        report.sh_order,
+        report.bytes as f64 / 1e6,
+        report.seconds.get("total").copied().unwrap_or_default(),
+        inspect::certified(report.certificate.as_ref())
+    )
 }
 
 fn file_name(path: &Path) -> String {

@@ -40,14 +40,19 @@ fn bytes_per_sample(asset: &Asset, sections: &[(&'static str, usize)]) -> f64 {
     sum as f64 / asset.samples.len().max(1) as f64
 }
 
+/// A relative error for people.
+pub fn percent(error: f64) -> String {
+    format!("{:.2} %", 100.0 * error)
+}
+
 /// The certificate in one line.
 pub fn certified(certificate: Option<&Certificate>) -> String {
     let Some(c) = certificate else { return "no certificate: the bake did not measure it".to_owned() };
     let with = format!("{} rays in {} views, {} lights, seed {}", c.rays, c.views, c.lights, c.seed);
     let Some(e) = &c.error else { return format!("not measurable: no light leaves the object ({with})") };
     format!(
-        "{:.2} % rel. RMSE, {:.1} dB, bias {:+.2} %; interpolation {:.2} %, light representation {:.2} % ({with})",
-        100.0 * e.rel_rmse,
+        "{} rel. RMSE, {:.1} dB, bias {:+.2} %; interpolation {:.2} %, light representation {:.2} % ({with})",
+        percent(e.rel_rmse),
         e.psnr_db,
         100.0 * e.bias,
         100.0 * e.interpolation,

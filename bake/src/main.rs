@@ -1,5 +1,6 @@
 //! `diaphane-bake`: bakes a mesh, or shows what is in an asset.
 
+mod batch;
 mod cli;
 mod inspect;
 mod terminal;
@@ -16,14 +17,15 @@ fn main() -> ExitCode {
             return ExitCode::SUCCESS;
         }
         Err(e) => Err(anyhow::anyhow!("{} (see --help)", one_line(&e.to_string()))),
-        Ok(arguments) => cli::run(arguments),
+        Ok(arguments) => cli::run(&arguments),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             let line = one_line(&format!("{error:#}"));
             eprintln!("error: {}", line.strip_prefix("error: ").unwrap_or(&line));
-            let failed = matches!(error.downcast_ref(), Some(diaphane_bake::Error::TooInaccurate(_)));
+            let failed = matches!(error.downcast_ref(), Some(diaphane_bake::Error::TooInaccurate(_)))
+                || error.is::<batch::SomeFailed>();
             ExitCode::from(if failed { 1 } else { 2 })
         }
     }

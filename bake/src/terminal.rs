@@ -42,7 +42,10 @@ impl Bars {
 
     /// Ends the last bar.
     pub fn finish(&self) {
-        self.lock().bar.finish();
+        let mut current = self.lock();
+        current.bar.finish();
+        // The next bake has stages of the same names.
+        current.name = "";
     }
 
     fn lock(&self) -> MutexGuard<'_, Current> {

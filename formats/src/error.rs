@@ -16,14 +16,14 @@ pub fn one_line(message: &str) -> String {
 #[non_exhaustive]
 pub enum Error {
     /// The operating system refused to read or write a file.
-    #[error("cannot {action} '{}': {source}", path.display())]
+    #[error("cannot {action} '{}': {cause}", path.display())]
     Io {
         /// What was attempted, for example "read".
         action: &'static str,
         /// The file.
         path: PathBuf,
         /// What the system said.
-        source: std::io::Error,
+        cause: std::io::Error,
     },
     /// A file was read but its contents make no sense.
     #[error("'{}': {message}", path.display())]
@@ -40,8 +40,8 @@ pub enum Error {
 
 impl Error {
     /// An I/O error on `path` while doing `action` ("read", "write", ...).
-    pub fn io(action: &'static str, path: &Path, source: std::io::Error) -> Self {
-        Self::Io { action, path: path.to_path_buf(), source }
+    pub fn io(action: &'static str, path: &Path, cause: std::io::Error) -> Self {
+        Self::Io { action, path: path.to_path_buf(), cause }
     }
 
     /// A complaint about the contents of `path`.

@@ -1,0 +1,212 @@
+//! `diaphane-bake batch`: many bakes from one list, each of which is also a plain command line.
+
+use crate::cli::{self, Arguments};
+use crate::inspect::percent;
+use crate::terminal::Bars;
+use anyhow::{Context, bail, ensure};
+use clap::Parser;
+use diaphane_bake::progress::Progress;
+use diaphane_bake::report::Report;
+use diaphane_formats::{files, one_line};
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+use toml::{Table, Value};
+
+/// What to bake.
+#[derive(clap::Args)]
+#[command(
+    after_help = "The list, paths relative to its folder:\n  [defaults]              # optional: options of all bakes\n  \
+                  preset = \"draft\"\n\n  [[bake]]\n  mesh = \"bunny.obj\"\n  material = \"wax.material.toml\"\n  output = \
+                  \"bunny.dph\"\n  samples = 20000         # any other option by its long name; flags are true\n\n\
+                  Examples:\n  diaphane-bake batch assets.toml\n  diaphane-bake batch assets.toml --commands | parallel\n\n\
+                  Exit codes: 0 all baked, 1 some failed, 2 the list is wrong or the batch was stopped."
+)]
+pub struct BatchArguments {
+    /// The list (TOML).
+    list: PathBuf,
+    /// Prints each bake's command line and bakes nothing.
+    #[arg(long)]
+    commands: bool,
+    /// Threads to use; all cores if not given.
+    #[arg(long, value_name = "T")]
+    threads: Option<usize>,
+    /// No progress bars; the summary stays.
+    #[arg(long, short)]
+    quiet: bool,
+}
+
+/// Bakes that failed, of a batch that went to its end.
+#[derive(Debug, thiserror::Error)]
+#[error("{failed} of {all} bakes failed")]
+pub struct SomeFailed {
+    failed: usize,
+    all: usize,
+}
+
+/// Options that hold for the whole program.
+const WHOLE: [&str; 2] = ["threads", "quiet"];
+
+/// Bakes the list, one after the other; a failure does not stop the rest.
+pub fn run(arguments: &BatchArguments) -> anyhow::Result<()> {
+    let folder = arguments.list.parent().unwrap_or(Path::new(""));
+    let text = String::from_utf8(files::read(&arguments.list)?)
+        .map_err(|_| anyhow::anyhow!("'{}' is not text", arguments.list.display()))?;
+    let name = arguments.list.display();
+    let lines = command_lines(&text, folder).with_context(|| format!("'{name}'"))?;
+    if arguments.commands {
+        lines.iter().for_each(|line| println!("{}", shell(line)));
+        return Ok(());
+    }
+    let bakes: Vec<Arguments> = lines
+        .iter()
+        .enumerate()
+        .map(|(i, line)| {
+            Arguments::try_parse_from(line)
+                .map_err(|e| anyhow::anyhow!("'{name}': bake {}: {}", i + 1, one_line(&e.to_string())))
+        })
+        .collect::<anyhow::Result<_>>()?;
+    cli::use_threads(arguments.threads)?;
+    let bars = Bars::new(arguments.quiet);
+    bars.cancel_on_interrupt().context("cannot listen for Ctrl-C")?;
+    let (mut summary, mut failed) = (Vec::new(), 0);
+    for (i, bake) in bakes.iter().enumerate() {
+        if !arguments.quiet {
+            eprintln!("bake {} of {}: {}", i + 1, bakes.len(), bake.output().display());
+        }
+        let start = Instant::now();
+        let result = cli::run_bake(bake, &bars);
+        if bars.cancelled() {
+            bail!("stopped in bake {} of {}; those before it are done", i + 1, bakes.len());
+        }
+        failed += usize::from(result.is_err());
+        summary.push(line(bake.output(), &result, start.elapsed().as_secs_f64()));
+    }
+    summary.iter().for_each(|line| println!("{line}"));
+    if failed > 0 { Err(SomeFailed { failed, all: bakes.len() }.into()) } else { Ok(()) }
+}
+
+fn line(output: &Path, result: &anyhow::Result<Report>, seconds: f64) -> String {
+    let name = output.display();
+    match result {
+        Ok(report) => {
+            let error = report.certificate.and_then(|c| c.error);
+            let error = error.map_or("not measured".to_owned(), |e| percent(e.rel_rmse));
+            let megabytes = report.bytes as f64 / 1e6;
+            format!(
+                "done    {name}  {} samples, {megabytes:.1} MB, error {error}, {seconds:.1} s",
+                report.samples
+            )
+        }
+        Err(e) => format!("FAILED  {name}  {}", one_line(&format!("{e:#}"))),
+    }
+}
+
+/// Program and arguments of every bake in the list.
+fn command_lines(text: &str, folder: &Path) -> anyhow::Result<Vec<Vec<String>>> {
+    let mut list: Table = text.parse().map_err(|e: toml::de::Error| anyhow::anyhow!("{}", e.message()))?;
+    let defaults = match list.remove("defaults") {
+        None => Table::new(),
+        Some(Value::Table(table)) => table,
+        Some(_) => bail!("'defaults' must be a table"),
+    };
+    let Some(Value::Array(bakes)) = list.remove("bake") else {
+        bail!("holds no [[bake]]; see diaphane-bake batch --help");
+    };
+    if let Some(key) = list.keys().next() {
+        bail!("'{key}' is no part of a list; there are [defaults] and [[bake]]");
+    }
+    ensure!(!bakes.is_empty(), "holds no [[bake]]; see diaphane-bake batch --help");
+    bakes
+        .into_iter()
+        .enumerate()
+        .map(|(i, bake)| {
+            let Value::Table(bake) = bake else { bail!("bake {} is not a table", i + 1) };
+            let mut options = defaults.clone();
+            options.extend(bake);
+            command_line(options, folder).with_context(|| format!("bake {}", i + 1))
+        })
+        .collect()
+}
+
+fn command_line(mut options: Table, folder: &Path) -> anyhow::Result<Vec<String>> {
+    let mut path = |key: &str| match options.remove(key) {
+        Some(Value::String(path)) => Ok(Some(folder.join(path).to_string_lossy().into_owned())),
+        Some(_) => bail!("'{key}' must be a path in quotes"),
+        None => Ok(None),
+    };
+    let mut line = vec!["diaphane-bake".to_owned()];
+    for key in ["mesh", "material", "output", "report"] {
+        let Some(path) = path(key)? else {
+            ensure!(key == "report", "'{key}' is missing");
+            continue;
+        };
+        line.extend((key != "mesh").then(|| format!("--{key}")));
+        line.push(path);
+    }
+    for (key, value) in options {
+        ensure!(!WHOLE.contains(&key.as_str()), "'{key}' holds for a whole batch: give --{key} to it");
+        let value = match value {
+            Value::Boolean(true) => None,
+            Value::Boolean(false) => continue,
+            Value::String(s) => Some(s),
+            Value::Integer(i) => Some(i.to_string()),
+            Value::Float(f) => Some(f.to_string()),
+            _ => bail!("'{key}' must be a number, a text or true"),
+        };
+        line.push(format!("--{key}"));
+        line.extend(value);
+    }
+    Ok(line)
+}
+
+/// A command line that a shell takes apart as it was.
+fn shell(line: &[String]) -> String {
+    let plain = |c: char| c.is_ascii_alphanumeric() || "-_./=,:+@%".contains(c);
+    let quoted = |word: &String| {
+        let safe = !word.is_empty() && word.chars().all(plain);
+        if safe { word.clone() } else { format!("'{}'", word.replace('\'', r"'\''")) }
+    };
+    line.iter().map(quoted).collect::<Vec<_>>().join(" ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn lines(text: &str) -> anyhow::Result<Vec<String>> {
+        Ok(command_lines(text, Path::new("in"))?.iter().map(|line| shell(line)).collect())
+    }
+
+    #[test]
+    fn entries_become_command_lines() {
+        let list = "[defaults]\nseed = 7\n[[bake]]\nmesh = \"a b.obj\"\nmaterial = \"m.toml\"\noutput = \"/o/a.dph\"\n\
+                    seed = 8\nno-certificate = true\nlight-error = 0.02\n[[bake]]\nmesh = \"it's.obj\"\nmaterial = \
+                    \"m.toml\"\noutput = \"b.dph\"\npreset = \"draft\"\n";
+        assert_eq!(
+            lines(list).unwrap(),
+            [
+                "diaphane-bake 'in/a b.obj' --material in/m.toml --output /o/a.dph --light-error 0.02 --no-certificate --seed 8",
+                r"diaphane-bake 'in/it'\''s.obj' --material in/m.toml --output in/b.dph --preset draft --seed 7",
+            ]
+        );
+    }
+
+    #[test]
+    fn wrong_lists_are_refused_in_words() {
+        let bake = "[[bake]]\nmesh = \"a\"\nmaterial = \"m\"\n";
+        for (text, part) in [
+            ("", "holds no [[bake]]"),
+            ("bake = 3", "holds no [[bake]]"),
+            ("bake = [3]", "bake 1 is not a table"),
+            (bake, "'output' is missing"),
+            (&format!("{bake}output = 3"), "must be a path"),
+            (&format!("{bake}output = \"o\"\nthreads = 2"), "whole batch"),
+            (&format!("{bake}output = \"o\"\nseed = [1]"), "'seed' must be"),
+            (&format!("extra = 1\n{bake}output = \"o\""), "'extra' is no part"),
+            ("[[bake", "expected"),
+        ] {
+            let error = format!("{:#}", lines(text).unwrap_err());
+            assert!(error.contains(part), "{text}: {error}");
+        }
+    }
+}
