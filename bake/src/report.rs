@@ -59,6 +59,12 @@ pub struct Report {
     pub shortfalls: Vec<String>,
 }
 
+/// Coefficients that samples do not need, of as many as `order` bands for all would take.
+fn unused_coefficients(params: &Params, asset: &Asset) -> usize {
+    let all = asset.samples.depth.order.iter();
+    all.map(|k| (params.order * params.order).saturating_sub(usize::from(*k).pow(2))).sum()
+}
+
 impl Report {
     pub(crate) fn new(
         params: &Params,
@@ -76,6 +82,8 @@ impl Report {
         let skipped = BTreeMap::from([
             ("distance_queries".to_owned(), shape.skipped_nodes),
             ("dark_or_outside_candidates".to_owned(), lit.dark_candidates),
+            ("samples_without_inside_tests".to_owned(), lit.buried),
+            ("coefficients".to_owned(), unused_coefficients(params, asset)),
         ]);
         let found = lit.samples.len();
         let mut shortfalls = Vec::new();

@@ -15,6 +15,7 @@ use crate::samples::Candidate;
 use diaphane_formats::directions::hash;
 use diaphane_formats::medium::Medium;
 use diaphane_formats::slopes::CELL_RADIUS;
+use diaphane_formats::visibility::Nearest;
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -23,6 +24,19 @@ const TRIES: usize = 3;
 
 /// The recurrence's steps: powers of the root of x⁴ = x + 1.
 const STEPS: DVec3 = DVec3::new(0.819_172_513_396_164_4, 0.671_043_606_703_789_3, 0.549_700_477_901_970_3);
+
+/// The surface point nearest to each sample within `reach` radii.
+pub(crate) fn nearest(shape: &Shape<'_>, samples: &[Candidate], reach: f64) -> Vec<Option<Nearest>> {
+    samples.par_iter().map(|s| shape.accel.nearest(s.position, reach * s.radius)).collect()
+}
+
+/// Whether the whole ball around each sample is inside; `nearest` must reach [`CELL_RADIUS`] radii.
+pub(crate) fn buried(samples: &[Candidate], nearest: &[Option<Nearest>]) -> Vec<bool> {
+    let within = |s: &Candidate, n: &Option<Nearest>| {
+        n.is_some_and(|n| n.distance <= f64::from(CELL_RADIUS) * s.radius)
+    };
+    samples.iter().zip(nearest).map(|(s, n)| !within(s, n)).collect()
+}
 
 /// The points of all samples.
 pub(crate) struct Cells {
@@ -33,11 +47,12 @@ pub(crate) struct Cells {
 }
 
 impl Cells {
-    /// `size` points for each sample.
+    /// `size` points for each sample; those of the samples that `buried` names are inside without a test.
     pub fn new(
         shape: &Shape<'_>,
         medium: &Medium,
         samples: &[Candidate],
+        buried: &[bool],
         size: usize,
         seed: u64,
     ) -> Result<Self> {
@@ -45,23 +60,27 @@ impl Cells {
             return Ok(Self { points: samples.iter().map(|s| s.position).collect(), size: 1 });
         }
         let width = TRIES * size;
-        let tries: Vec<DVec3> = samples
-            .par_iter()
-            .enumerate()
-            .flat_map_iter(|(i, s)| {
-                let radius = f64::from(CELL_RADIUS) * s.radius;
-                in_ball(hash(seed, i as u64)).take(width).map(move |p| s.position + p * radius)
-            })
-            .collect();
-        let inside = inside_nodes(shape.mesh, &tries)?;
+        let tries = |i: usize| {
+            let s = &samples[i];
+            let radius = f64::from(CELL_RADIUS) * s.radius;
+            in_ball(hash(seed, i as u64)).take(width).map(move |p| s.position + p * radius)
+        };
+        let doubtful: Vec<usize> = (0..samples.len()).filter(|i| !buried[*i]).collect();
+        let tested: Vec<DVec3> = doubtful.par_iter().flat_map_iter(|i| tries(*i)).collect();
+        let inside = inside_nodes(shape.mesh, &tested)?;
+        let mut row = vec![usize::MAX; samples.len()];
+        doubtful.iter().enumerate().for_each(|(k, i)| row[*i] = k);
         let points = samples
             .par_iter()
             .enumerate()
             .flat_map_iter(|(i, s)| {
-                let own = i * width..(i + 1) * width;
-                let found: Vec<DVec3> = own.filter(|k| inside[*k]).map(|k| tries[k]).collect();
-                let even = medium.is_homogeneous().then(|| found.iter().copied().take(size).collect());
-                let mut kept: Vec<DVec3> = even.unwrap_or_else(|| as_scattering(medium, &found, size));
+                let is_inside = |k: usize| buried[i] || inside[row[i] * width + k];
+                let found = tries(i).enumerate().filter(|(k, _)| is_inside(*k)).map(|(_, p)| p);
+                let mut kept: Vec<DVec3> = if medium.is_homogeneous() {
+                    found.take(size).collect()
+                } else {
+                    as_scattering(medium, &found.collect::<Vec<_>>(), size)
+                };
                 if kept.is_empty() {
                     kept.push(s.position);
                 }

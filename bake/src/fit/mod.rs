@@ -10,7 +10,7 @@ mod rounding;
 mod weights;
 
 pub(crate) use boundary::boundary_order;
-pub(crate) use cells::Cells;
+pub(crate) use cells::{Cells, buried, nearest};
 pub(crate) use depths::{Lit, depths};
 pub(crate) use harmonics::{Light, harmonics};
 pub(crate) use weights::weights;

@@ -2,7 +2,7 @@
 
 use super::Bench;
 use crate::Result;
-use crate::fit::{Cells, Light, boundary_order, weights};
+use crate::fit::{Cells, Light, boundary_order, buried, nearest, weights};
 use crate::measure::exact;
 use crate::measure::play::Player;
 use crate::measure::truth::{Nodes, Radiance};
@@ -11,6 +11,7 @@ use crate::pack::{Stand, pack};
 use crate::progress::Stage;
 use crate::samples::Placed;
 use diaphane_formats::directions::{even_directions, hash};
+use diaphane_formats::slopes::CELL_RADIUS;
 use glam::{DVec3, Vec3};
 
 /// Directions of view.
@@ -66,7 +67,9 @@ impl Trial {
     ) -> Result<Measured> {
         let medium = bench.medium.medium;
         let seed = hash(bench.params.seed, 97);
-        let cells = Cells::new(bench.shape, medium, &placed.samples, POINTS, seed)?;
+        let near = nearest(bench.shape, &placed.samples, f64::from(CELL_RADIUS));
+        let buried = buried(&placed.samples, &near);
+        let cells = Cells::new(bench.shape, medium, &placed.samples, &buried, POINTS, seed)?;
         let weight = weights(&placed.samples, &placed.probes, width_factor, stage)?;
         let params = &crate::params::Params { width_factor, ..bench.params.clone() };
         let stand = Stand { samples: &placed.samples, cells: &cells, discarded: 0 };
