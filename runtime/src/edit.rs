@@ -15,7 +15,7 @@ pub const MOST_SCALE: f64 = 1e6;
 /// Factors on the extinction within which an edited asset was measured to have at most 1.5 times the error of one baked
 /// anew. Below, the harmonics must tell apart depths that were equally dark when they were fitted (exact depths do
 /// not have this limit); above, the samples lie too far apart for light that fades so fast.
-pub const MEASURED_SCALES: [f64; 2] = [0.5, 2.0];
+pub const MEASURED_SCALES: [f64; 2] = [0.6, 1.8];
 
 /// A material relative to the one that was baked. [`Edit::default`] leaves it as it is.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -77,14 +77,14 @@ fn plays_another_material() {
     let (baked, stats, _) = draw("a.exr", &[]);
     assert_eq!(stats["extinction"], serde_json::json!([4.0, 4.0, 4.0]));
     assert_eq!(stats["albedo"], serde_json::json!([0.8, 0.6, 0.4]));
-    let edit = ["--extinction-scale", "0.5,1,2", "--albedo", "0.4"];
+    let edit = ["--extinction-scale", "0.75,1,1.5", "--albedo", "0.4"];
     let (edited, stats, said) = draw("b.exr", &edit);
-    assert_eq!(stats["extinction"], serde_json::json!([2.0, 4.0, 8.0]));
+    assert_eq!(stats["extinction"], serde_json::json!([3.0, 4.0, 6.0]));
     assert_eq!(stats["albedo"], serde_json::json!([0.4, 0.4, 0.4]));
     assert!(baked != edited && !said.contains("warning"), "{said}");
     // Far from the baked medium: drawn, and said.
     let (_, _, said) = draw("c.exr", &["--extinction-scale", "100"]);
-    assert!(said.contains("warning: the extinction scale") && said.contains("0.5..2"), "{said}");
+    assert!(said.contains("warning: the extinction scale") && said.contains("0.6..1.8"), "{said}");
 }
 
 #[test]

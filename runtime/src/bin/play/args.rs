@@ -41,7 +41,7 @@ pub struct Args {
     /// inside the object's bounding box). Headless default: baked; in the window: auto
     #[arg(long, value_enum)]
     pub light: Option<LightArg>,
-    /// Play with the baked extinction times S, one factor for all channels or one for each (0.5..2 is nearly as
+    /// Play with the baked extinction times S, one factor for all channels or one for each (0.6..1.8 is nearly as
     /// good as a new bake)
     #[arg(long, value_name = "S|R,G,B", value_parser = parse_channels, allow_hyphen_values = true)]
     pub extinction_scale: Option<DVec3>,
