@@ -65,6 +65,16 @@ pub fn run(arguments: &BatchArguments) -> anyhow::Result<()> {
                 .map_err(|e| anyhow::anyhow!("'{name}': bake {}: {}", i + 1, one_line(&e.to_string())))
         })
         .collect::<anyhow::Result<_>>()?;
+    for (i, bake) in bakes.iter().enumerate() {
+        if let Some(k) = bakes[..i].iter().position(|other| other.output() == bake.output()) {
+            bail!(
+                "'{name}': bakes {} and {} write the same file '{}'",
+                k + 1,
+                i + 1,
+                bake.output().display()
+            );
+        }
+    }
     cli::use_threads(arguments.threads)?;
     let bars = Bars::new(arguments.quiet);
     bars.cancel_on_interrupt().context("cannot listen for Ctrl-C")?;

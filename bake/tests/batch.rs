@@ -59,4 +59,10 @@ fn a_wrong_option_is_named_before_anything_is_baked() {
     assert_eq!(err.lines().count(), 1, "{err}");
     assert!(err.contains("bake 2") && err.contains("--sample"), "{err}");
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+
+    // One asset would replace the other.
+    std::fs::write(folder.path().join("list.toml"), entry("") + &entry("seed = 3")).unwrap();
+    let ran = bake(&["batch", "list.toml"], folder.path());
+    assert_eq!(ran.status.code(), Some(2));
+    assert!(text(&ran.stderr).contains("bakes 1 and 2 write the same file"), "{ran:?}");
 }

@@ -17,7 +17,7 @@ fn visibility(c: &mut Criterion) {
     let mut group = c.benchmark_group("visibility");
     group.sample_size(10);
     for count in [1_000, 10_000, 100_000] {
-        let points = points_inside(&mesh, &accel, count, 1);
+        let points = points_inside(&mesh, &accel, count, 0.0, 1);
         group.throughput(Throughput::Elements(2 * count as u64));
         group.bench_function(BenchmarkId::new("project", count), |b| {
             b.iter(|| black_box(project(&mesh, &even, &points, axis)));

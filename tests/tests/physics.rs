@@ -10,7 +10,7 @@ use diaphane_formats::phase::Phase;
 use diaphane_formats::visibility::{Accel, depth_along, project};
 use glam::DVec3;
 use std::f64::consts::PI;
-use support::points_inside;
+use validation::speed::visibility::points_inside;
 
 fn medium(kappa: f64, ior: f64, density: Density) -> Medium {
     Medium::new(DVec3::splat(kappa), DVec3::ONE, Phase::Isotropic, ior, density).unwrap()
@@ -36,7 +36,7 @@ fn divergence_of_the_first_moment_is_extinction_times_fluence() {
         let far_from_jumps = |x: &DVec3| {
             (-10..=10).all(|i| rho(*x + DVec3::new(0.6, 0.8, 0.0) * 1e-4 * f64::from(i)) == rho(*x))
         };
-        let points = points_inside(&mesh, &accel, 30, 0.01);
+        let points = points_inside(&mesh, &accel, 30, 0.01, 11);
         for x in points.into_iter().filter(far_from_jumps) {
             let psi = |p: DVec3, w: DVec3| {
                 (-3.0 * depth_along(&accel, &medium, p, w, f64::INFINITY, &mut Vec::new()).density_length)
@@ -66,7 +66,7 @@ fn chords_of_a_ball_lie_between_those_of_its_bounds() {
     let inner = (0..mesh.triangles.len()).map(nearest).fold(f64::INFINITY, f64::min);
     assert!(inner > 0.999);
     let medium = medium(1.0, 1.0, Density::Uniform(1.0));
-    let points: Vec<DVec3> = points_inside(&mesh, &accel, 200, 1.0 - inner + 1e-6);
+    let points: Vec<DVec3> = points_inside(&mesh, &accel, 200, 1.0 - inner + 1e-6, 11);
     let chord = |x: DVec3, w: DVec3, r: f64| {
         let b = x.dot(w);
         -b + (b * b + r * r - x.length_squared()).sqrt()
@@ -91,7 +91,7 @@ fn chords_of_a_ball_lie_between_those_of_its_bounds() {
 fn agreement(name: &str, shape: &Triangles, medium: &Medium) {
     let mesh: Mesh = shape.to_mesh().unwrap();
     let accel = Accel::new(&mesh);
-    let points = points_inside(&mesh, &accel, 150, 1e-3);
+    let points = points_inside(&mesh, &accel, 150, 1e-3, 11);
     let close = 3e-6 * mesh.diagonal();
     for w in even_directions(24, 8).into_iter().step_by(2) {
         let rows = project(&mesh, medium, &points, w);

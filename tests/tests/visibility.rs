@@ -17,7 +17,7 @@ fn no_winding_is_wrong_and_depths_agree() {
         let mesh = object.place().unwrap().mesh;
         let accel = Accel::new(&mesh);
         let even = medium(&mesh, false).unwrap();
-        let points = points_inside(&mesh, &accel, 5_000, 1);
+        let points = points_inside(&mesh, &accel, 5_000, 0.0, 1);
         assert_eq!(points.len(), 5_000);
         let found = agreement(&mesh, &accel, &even, &points, 40);
         assert_eq!(found.lines, 200_000);
@@ -37,7 +37,7 @@ fn uneven_media_and_refracting_boundaries_agree_too() {
     };
     // A density that is not 1 shows whether it counts once.
     let media = [with(Density::Uniform(0.7), 1.5), with(layers(), 1.0), with(layers(), 1.3)];
-    let points = points_inside(&mesh, &accel, 3_000, 2);
+    let points = points_inside(&mesh, &accel, 3_000, 0.0, 2);
     for medium in &media {
         let sampled = SampledDensity::new(medium, low, high, 48);
         for sampled in [None, Some(&sampled)] {

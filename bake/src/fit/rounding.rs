@@ -42,9 +42,12 @@ impl Rounding {
         self.columns.row(k).to_slice().unwrap_or(&[])
     }
 
-    /// Changes `codes` for the better; `lobe` (0 or positive) is what the sample has beside its harmonics, in all
+    /// Changes `codes` for the better (not those of a fit that is not finite); `lobe` (0 or positive) is what the sample has beside its harmonics, in all
     /// directions: the first half, then their opposites.
     pub fn choose(&self, x: &[f32], lobe: impl Fn(usize) -> f32, book: &CodeBook<'_>, codes: &mut [i32]) {
+        if x.iter().any(|x| !x.is_finite()) {
+            return;
+        }
         let y: Vec<f32> = (0..2 * self.columns.ncols()).map(lobe).collect();
         Arch::new().dispatch(
             #[inline(always)]

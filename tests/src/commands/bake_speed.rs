@@ -62,7 +62,7 @@ pub fn run(a: &Arguments) -> anyhow::Result<bool> {
     let mut lines = vec![Line::new("triangles", mesh.triangles.len().to_string())];
 
     tell("rays per second by both methods ...");
-    let points = points_inside(&mesh, &accel, a.points, 3);
+    let points = points_inside(&mesh, &accel, a.points, 0.0, 3);
     anyhow::ensure!(!points.is_empty(), "no point inside the mesh was found");
     let r = rates(&mesh, &accel, &even, &points, DIRECTIONS, TRACED);
     let count = points.len();

@@ -1,11 +1,8 @@
 //! What several tests need.
 #![allow(dead_code)] // Each test file uses its own part.
 
-use diaphane_formats::mesh::Mesh;
 use diaphane_formats::picture::Picture;
 use diaphane_formats::scene::{Scene, parse_scene};
-use diaphane_formats::visibility::Accel;
-use glam::DVec3;
 use std::path::{Path, PathBuf};
 
 /// The workspace's root.
@@ -26,23 +23,6 @@ pub fn reference_folder() -> Option<PathBuf> {
 /// A scene from its text.
 pub fn scene(text: &str) -> Scene {
     parse_scene(text, Path::new(".")).unwrap()
-}
-
-/// `count` points inside the mesh at least `margin` from its surface, always the same ones.
-pub fn points_inside(mesh: &Mesh, accel: &Accel, count: usize, margin: f64) -> Vec<DVec3> {
-    use rand::{RngExt, SeedableRng};
-    let mut random = rand_pcg::Pcg64Mcg::seed_from_u64(11);
-    let (low, high) = mesh.bounds();
-    let mut crossings = Vec::new();
-    let mut points = Vec::new();
-    while points.len() < count {
-        let p = low + (high - low) * DVec3::new(random.random(), random.random(), random.random());
-        accel.crossings(p, DVec3::new(0.36, 0.48, 0.8), 0.0, f64::INFINITY, &mut crossings);
-        if crossings.iter().map(|c| c.sign).sum::<i32>() > 0 && accel.nearest(p, margin).is_none() {
-            points.push(p);
-        }
-    }
-    points
 }
 
 /// Nodes and weights of the Gauss-Legendre rule on 0..1: roots of the Legendre polynomial by Newton's method.
