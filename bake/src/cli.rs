@@ -22,6 +22,7 @@ use std::path::{Path, PathBuf};
         diaphane-bake bunny.obj --material wax.material.toml --output bunny.dph --preset draft\n  \
         diaphane-bake bunny.obj --material wax.material.toml --output bunny.dph --samples 100000 --report bake.json\n  \
         diaphane-bake bunny.obj --material wax.material.toml --output bunny.dph --max-error 0.03\n  \
+        diaphane-bake bunny.obj --material wax.material.toml --output bunny.dph --cache bakes --sh-order 8\n  \
         diaphane-bake inspect bunny.dph --json\n  \
         diaphane-bake batch assets.toml"
 )]
@@ -97,6 +98,14 @@ struct BakeArguments {
     /// Does not measure the asset's error.
     #[arg(long)]
     no_certificate: bool,
+    /// Keeps the results of all stages in this folder and finds them there again: a bake with another albedo or fewer bands,
+    /// or one that was interrupted, repeats only what differs. About 2 bytes for each sample and direction; anything in it can
+    /// be deleted at any time.
+    #[arg(long, value_name = "DIR")]
+    cache: Option<PathBuf>,
+    /// Refuses bakes that would take more memory (such as 4G or 500M); the need is predicted before any work.
+    #[arg(long, value_name = "SIZE", value_parser = memory_size)]
+    memory_limit: Option<u64>,
     /// Writes a report in JSON.
     #[arg(long, value_name = "R.json")]
     report: Option<PathBuf>,
@@ -155,6 +164,8 @@ impl BakeArguments {
         params.seed = self.seed.unwrap_or(params.seed);
         params.certificate = !self.no_certificate;
         params.max_error = self.max_error;
+        params.cache = self.cache.clone();
+        params.memory_limit = self.memory_limit;
         params.visibility = match self.visibility {
             VisibilityName::Auto => Visibility::Auto,
             VisibilityName::Project => Visibility::Project,
@@ -263,6 +274,26 @@ fn summary(output: &Path, report: &Report) -> String {
         report.seconds.get("total").copied().unwrap_or_default(),
         inspect::certified(report.certificate.as_ref())
     )
+}
+
+/// Bytes from a number with K, M or G (powers of 1,000), KiB, MiB or GiB (of 1,024), or nothing behind it.
+fn memory_size(text: &str) -> Result<u64, String> {
+    let digits = text.find(|c: char| !c.is_ascii_digit() && c != '.').unwrap_or(text.len());
+    let (number, unit) = text.split_at(digits);
+    let factor = match unit.trim().to_ascii_lowercase().as_str() {
+        "" | "b" => 1.0,
+        "k" | "kb" => 1e3,
+        "m" | "mb" => 1e6,
+        "g" | "gb" => 1e9,
+        "kib" => 1024.0,
+        "mib" => 1024.0 * 1024.0,
+        "gib" => 1024.0 * 1024.0 * 1024.0,
+        _ => return Err("write it as 500M, 4G or 4GiB".to_owned()),
+    };
+    match number.parse::<f64>() {
+        Ok(n) if n * factor >= 1.0 && n.is_finite() => Ok((n * factor) as u64),
+        _ => Err("write it as 500M, 4G or 4GiB".to_owned()),
+    }
 }
 
 fn file_name(path: &Path) -> String {

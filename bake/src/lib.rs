@@ -4,9 +4,11 @@
 //! mesh ─ field ─ layers ─ density ─ samples ─ (refine) ─ fit (optical depth, harmonics, weights) ─ pack ─ certificate ─ asset
 //! ```
 //!
-//! A stage imports only the stages before it. Nothing here prints; progress and cancellation go through
+//! A stage imports only the stages before it; [`pipeline`] runs them, [`cache`] remembers what they made. Nothing here prints; progress and cancellation go through
 //! [`progress::Progress`].
 
+mod blocks;
+pub mod cache;
 mod certificate;
 mod density;
 mod error;
@@ -14,8 +16,10 @@ mod field;
 mod fit;
 mod layers;
 mod measure;
+pub mod memory;
 mod pack;
 pub mod params;
+mod pipeline;
 pub mod progress;
 mod refine;
 pub mod report;
@@ -24,12 +28,13 @@ mod visibility;
 
 pub use error::{Error, Result};
 
+use cache::Cache;
 use certificate::Goal;
 use diaphane_formats::asset::Asset;
 use diaphane_formats::medium::{Density, Medium, SampledDensity};
 use diaphane_formats::mesh::{Mesh, MeshReport};
-use pack::Stand;
 use params::Params;
+use pipeline::Pipeline;
 use progress::{Progress, Timed};
 use report::Report;
 
@@ -76,48 +81,16 @@ impl<'a> Prepared<'a> {
 /// Parameters out of range, a mesh that leaves no room for samples, an error that cannot be met, cancellation.
 pub fn bake(input: &Input<'_>, params: &Params, progress: &dyn Progress) -> Result<(Asset, Report)> {
     params.validate()?;
-    let mut timed = Timed::new(progress);
+    let cache = Cache::open(params.cache.as_deref())?;
+    let timed = Timed::new(progress);
     let mut params = params.clone();
     let mut goal = Goal::default();
     loop {
-        let baked = bake_once(input, &params, &mut timed)?;
+        memory::require(input, &params)?;
+        let baked = Pipeline::new(input, &params, &cache, &timed).run()?;
         match goal.next(&params, baked.0.info.certificate.as_ref())? {
             None => return Ok(baked),
             Some(next) => params = next,
         }
     }
-}
-
-fn bake_once(input: &Input<'_>, params: &Params, timed: &mut Timed<'_>) -> Result<(Asset, Report)> {
-    let shape = timed.stage("distance field", |p| field::Shape::new(input.mesh, params, p))?;
-    let medium = timed.stage("medium", |_| Ok(Prepared::new(input.medium, input.mesh)))?;
-    let layers = timed.stage("layers", |p| layers::build(&shape, input.medium, params.placement, p))?;
-    let density = timed.stage("density", |p| density::evaluate(&shape, &layers, &medium, params, p))?;
-    let (offered, placed) = timed.stage("samples", |p| {
-        let offered = samples::offer(&shape, &layers, &density, input.medium, params)?;
-        let placed = samples::place(&shape, &offered, params.samples, |_| 1.0, p)?;
-        Ok((offered, placed))
-    })?;
-    let bench = refine::Bench { input, shape: &shape, medium: &medium, offered: &offered, params };
-    let (placed, width_factor, refined) = match params.refine {
-        0 => (placed, params.width_factor, None),
-        rounds => timed.stage("refinement", |p| refine::refine(&bench, placed, rounds, p))?,
-    };
-    let params = &Params { width_factor, ..params.clone() };
-    let lit = timed.stage("optical depth", |p| fit::depths(&shape, &medium, placed, params, p))?;
-    let harmonics = timed.stage("harmonics", |p| fit::harmonics(&lit, params, p))?;
-    let weights = timed.stage("weights", |p| fit::weights(&lit.samples, &lit.probes, width_factor, p))?;
-    let stand = Stand { samples: &lit.samples, cells: &lit.cells, discarded: lit.discarded };
-    let mut asset = timed.stage("packing", |_| {
-        pack::pack(input, medium.sampled.as_ref(), params, &stand, harmonics, weights)
-    })?;
-    if params.certificate {
-        let measured = timed.stage("certificate", |p| {
-            certificate::measure(&shape, &medium, &lit.cells, &asset, params.seed, p)
-        })?;
-        asset.info.certificate = Some(measured);
-    }
-    let report =
-        Report { refinement: refined, ..Report::new(params, &shape, &layers, &lit, &asset, &timed.seconds) };
-    Ok((asset, report))
 }

@@ -1,23 +1,19 @@
 //! Everything into one asset.
 
-use crate::fit::{Cells, Light, boundary_order};
+use crate::fit::{Light, boundary_order};
 use crate::params::Params;
 use crate::samples::Candidate;
 use crate::{Input, Result};
 use diaphane_formats::asset::{Asset, DensityGrid, Info, Provenance, Samples};
 use diaphane_formats::medium::{Density, Medium, SampledDensity};
-use diaphane_formats::mesh::Mesh;
 use glam::DVec3;
 use half::f16;
-
-/// Range of an offset in 127ths of a radius.
-const LEAST: DVec3 = DVec3::splat(-127.0);
-const MOST: DVec3 = DVec3::splat(127.0);
 
 /// Where the samples stand.
 pub(crate) struct Stand<'a> {
     pub samples: &'a [Candidate],
-    pub cells: &'a Cells,
+    /// Where their values hold, as the asset stores it.
+    pub offset: Vec<[i8; 4]>,
     /// Samples that were dropped.
     pub discarded: usize,
 }
@@ -26,7 +22,7 @@ pub(crate) fn pack(
     input: &Input<'_>,
     sampled: Option<&SampledDensity>,
     params: &Params,
-    placed: &Stand<'_>,
+    placed: Stand<'_>,
     light: Light,
     weight: Vec<f32>,
 ) -> Result<Asset> {
@@ -42,23 +38,11 @@ pub(crate) fn pack(
             [x, y, z, s.radius as f32]
         })
         .collect();
-    let offset = placed
-        .samples
-        .iter()
-        .enumerate()
-        .map(|(i, s)| {
-            let [x, y, z] = ((placed.cells.centroid(i) - s.position) * (127.0 / s.radius))
-                .round()
-                .clamp(LEAST, MOST)
-                .to_array();
-            [x as i8, y as i8, z as i8, 0]
-        })
-        .collect();
     let info = Info {
         provenance: Provenance {
             program: concat!("diaphane-bake ", env!("CARGO_PKG_VERSION")).to_owned(),
             mesh_name: input.mesh_name.clone(),
-            mesh_hash: mesh_hash(input.mesh),
+            mesh_hash: input.mesh.content_hash(),
             material_name: input.material_name.clone(),
             seed: params.seed,
             directions: params.directions.next_multiple_of(2) as u32,
@@ -85,7 +69,7 @@ pub(crate) fn pack(
         info,
         samples: Samples {
             position_radius,
-            offset,
+            offset: placed.offset,
             weight,
             depth: light.depth,
             lobe: light.lobe,
@@ -97,21 +81,6 @@ pub(crate) fn pack(
     };
     asset.validate()?;
     Ok(asset)
-}
-
-fn mesh_hash(mesh: &Mesh) -> [u8; 32] {
-    let mut hasher = blake3::Hasher::new();
-    for p in &mesh.positions {
-        for c in p.to_array() {
-            hasher.update(&c.to_le_bytes());
-        }
-    }
-    for t in &mesh.triangles {
-        for i in t {
-            hasher.update(&i.to_le_bytes());
-        }
-    }
-    *hasher.finalize().as_bytes()
 }
 
 /// A grid is carried as it is; other fields as they were sampled over the mesh's box.

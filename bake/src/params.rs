@@ -2,6 +2,8 @@
 
 use crate::{Error, Result};
 use diaphane_formats::sh::MAX_ORDER;
+use serde::Serialize;
+use std::path::PathBuf;
 
 /// Parameters of a bake. [`Params::default`] is the preset `standard`.
 #[derive(Clone, Debug, PartialEq)]
@@ -37,6 +39,10 @@ pub struct Params {
     pub certificate: bool,
     /// Largest certified relative error; samples or bands are added until it is met.
     pub max_error: Option<f64>,
+    /// Folder where results of stages are kept and found again ([`crate::cache`]).
+    pub cache: Option<PathBuf>,
+    /// Bytes that the bake may take, as predicted ([`crate::memory`]).
+    pub memory_limit: Option<u64>,
 }
 
 /// Directions used to estimate the fluence on the layers.
@@ -55,7 +61,7 @@ pub const RADIUS_EXPONENT: f64 = 0.3;
 pub const BOUNDARY_SNAP: f64 = 0.3;
 
 /// The function of optical depth that is expanded in spherical harmonics, see [`diaphane_formats::encoding`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub enum Representation {
     /// ψ, the thesis' choice.
     Transmittance,
@@ -68,7 +74,7 @@ pub enum Representation {
 }
 
 /// How the optical depth of many points along one direction is found; the result is the same.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub enum Visibility {
     /// Whichever should be faster for so many points and triangles.
     Auto,
@@ -79,7 +85,7 @@ pub enum Visibility {
 }
 
 /// Where samples may stand.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub enum Placement {
     /// On the boundary and anywhere under it.
     Boundary,
@@ -122,6 +128,8 @@ impl Params {
             refine: if preset == Preset::Fine { 4 } else { 0 },
             certificate: true,
             max_error: None,
+            cache: None,
+            memory_limit: None,
         }
     }
 

@@ -1,11 +1,12 @@
 //! Progress and cancellation: one message type for terminals, windows and tests.
 
 use crate::{Error, Result};
+use std::cell::RefCell;
 use std::time::Instant;
 
 /// Receives progress. Called from many threads.
 pub trait Progress: Sync {
-    /// A stage begins; `total` units of work will follow (0 when unknown).
+    /// A stage begins or goes on; `total` units more will follow (0 when unknown or told before). Stages may take turns.
     fn stage(&self, name: &'static str, total: u64);
     /// `units` more are done.
     fn advance(&self, units: u64);
@@ -47,22 +48,27 @@ impl Stage<'_> {
 /// Runs stages and keeps their times.
 pub(crate) struct Timed<'a> {
     progress: &'a dyn Progress,
-    pub seconds: Vec<(&'static str, f64)>,
+    pub seconds: RefCell<Vec<(&'static str, f64)>>,
 }
 
 impl<'a> Timed<'a> {
     pub fn new(progress: &'a dyn Progress) -> Self {
-        Self { progress, seconds: Vec::new() }
+        Self { progress, seconds: RefCell::default() }
     }
 
-    pub fn stage<T>(&mut self, name: &'static str, work: impl FnOnce(Stage<'a>) -> Result<T>) -> Result<T> {
+    /// Says how many units of a stage follow, before any of them.
+    pub fn announce(&self, name: &'static str, total: usize) {
+        self.progress.stage(name, total as u64);
+    }
+
+    pub fn stage<T>(&self, name: &'static str, work: impl FnOnce(Stage<'a>) -> Result<T>) -> Result<T> {
         self.progress.stage(name, 0);
         if self.progress.cancelled() {
             return Err(Error::Cancelled);
         }
         let start = Instant::now();
         let result = work(Stage { progress: self.progress, name })?;
-        self.seconds.push((name, start.elapsed().as_secs_f64()));
+        self.seconds.borrow_mut().push((name, start.elapsed().as_secs_f64()));
         Ok(result)
     }
 }

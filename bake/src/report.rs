@@ -1,16 +1,16 @@
 //! What a bake did, for people and for `--report`.
 
-use crate::field::Shape;
-use crate::fit::Lit;
-use crate::layers::Layer;
-use crate::params::Params;
+use crate::cache::CacheReport;
+use crate::memory::{self, MemoryReport};
+use crate::params::{Params, Visibility};
+use crate::samples::Placed;
 use diaphane_formats::asset::{Asset, Certificate, encode};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// What refinement did: relative errors of ray integrals with exact light, on rays and lights of its own; infinite (null
 /// in JSON) where no light leaves the object.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Refinement {
     /// Before.
     pub before: f64,
@@ -57,6 +57,22 @@ pub struct Report {
     pub certificate: Option<Certificate>,
     /// What the bake could not do as asked, in sentences.
     pub shortfalls: Vec<String>,
+    /// What the cache held; `None` without one.
+    pub cache: Option<CacheReport>,
+    /// Bytes that the bake took.
+    pub memory: MemoryReport,
+}
+
+/// What the stages tell.
+pub(crate) struct Facts<'a> {
+    pub placed: &'a Placed,
+    pub refinement: Option<Refinement>,
+    pub layers: usize,
+    pub skipped_queries: usize,
+    pub buried: usize,
+    pub dark: usize,
+    pub discarded: usize,
+    pub visibility: Visibility,
 }
 
 /// Coefficients that samples do not need, of as many as `order` bands for all would take.
@@ -68,11 +84,10 @@ fn unused_coefficients(params: &Params, asset: &Asset) -> usize {
 impl Report {
     pub(crate) fn new(
         params: &Params,
-        shape: &Shape<'_>,
-        layers: &[Layer],
-        lit: &Lit,
+        facts: &Facts<'_>,
         asset: &Asset,
         stages: &[(&'static str, f64)],
+        cache: Option<CacheReport>,
     ) -> Self {
         let mut seconds = BTreeMap::new();
         for (name, s) in stages {
@@ -80,33 +95,40 @@ impl Report {
         }
         seconds.insert("total".to_owned(), stages.iter().map(|(_, s)| s).sum());
         let skipped = BTreeMap::from([
-            ("distance_queries".to_owned(), shape.skipped_nodes),
-            ("dark_or_outside_candidates".to_owned(), lit.dark_candidates),
-            ("samples_without_inside_tests".to_owned(), lit.buried),
+            ("distance_queries".to_owned(), facts.skipped_queries),
+            ("dark_or_outside_candidates".to_owned(), facts.placed.dark),
+            ("samples_without_inside_tests".to_owned(), facts.buried),
+            ("dark_directions".to_owned(), facts.dark),
             ("coefficients".to_owned(), unused_coefficients(params, asset)),
         ]);
-        let found = lit.samples.len();
+        let (found, directions) = (asset.samples.len(), params.directions.next_multiple_of(2));
         let mut shortfalls = Vec::new();
         if found.abs_diff(params.samples) * 20 > params.samples {
             shortfalls.push(format!("{} samples were asked for, {found} found a place", params.samples));
         }
+        if let Some(cache) = &cache {
+            shortfalls.extend(cache.problems.iter().map(|p| format!("cache: {p}")));
+        }
+        let rays = facts.placed.samples.len() * params.points_per_sample * directions;
         Self {
-            samples: lit.samples.len(),
-            directions: lit.directions.len(),
+            samples: found,
+            directions,
             sh_order: params.order,
-            rays: lit.rays,
-            visibility: lit.visibility,
+            rays: rays as u64,
+            visibility: if facts.visibility == Visibility::Trace { "trace" } else { "project" },
             seconds,
             bytes: encode(asset).map_or(0, |b| b.len()),
             seed: params.seed,
-            discarded: lit.discarded,
-            snapped: lit.snapped,
-            layers: layers.len(),
+            discarded: facts.discarded,
+            snapped: facts.placed.snapped,
+            layers: facts.layers,
             skipped,
-            refinement: None,
+            refinement: facts.refinement.clone(),
             certificate: asset.info.certificate,
             shortfalls,
             warnings: asset.info.provenance.mesh_report.warnings(),
+            cache,
+            memory: memory::report(params, asset),
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Progress on a terminal: one bar for each stage; plain lines elsewhere.
 
 use diaphane_bake::progress::Progress;
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
 use std::io::IsTerminal;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -11,12 +11,16 @@ pub struct Bars {
     quiet: bool,
     terminal: bool,
     stop: Arc<AtomicBool>,
-    current: Mutex<Current>,
+    stages: Mutex<Stages>,
 }
 
-struct Current {
-    name: &'static str,
-    bar: ProgressBar,
+/// The stages so far, which may take turns, each with its bar.
+#[derive(Default)]
+struct Stages {
+    bars: Vec<(&'static str, ProgressBar)>,
+    all: MultiProgress,
+    /// Index of the one at work.
+    current: usize,
 }
 
 impl Bars {
@@ -26,7 +30,7 @@ impl Bars {
             quiet,
             terminal: std::io::stderr().is_terminal(),
             stop: Arc::new(AtomicBool::new(false)),
-            current: Mutex::new(Current { name: "", bar: ProgressBar::hidden() }),
+            stages: Mutex::default(),
         }
     }
 
@@ -40,16 +44,14 @@ impl Bars {
         })
     }
 
-    /// Ends the last bar.
+    /// Ends all bars: the next bake has stages of the same names.
     pub fn finish(&self) {
-        let mut current = self.lock();
-        current.bar.finish();
-        // The next bake has stages of the same names.
-        current.name = "";
+        let mut stages = self.lock();
+        stages.bars.drain(..).for_each(|(_, bar)| bar.finish());
     }
 
-    fn lock(&self) -> MutexGuard<'_, Current> {
-        self.current.lock().unwrap_or_else(PoisonError::into_inner)
+    fn lock(&self) -> MutexGuard<'_, Stages> {
+        self.stages.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -58,29 +60,35 @@ impl Progress for Bars {
         if self.quiet {
             return;
         }
-        let mut current = self.lock();
-        if current.name == name {
-            // A stage may announce its work in parts: what is done stays done.
-            current.bar.set_length(current.bar.position() + total);
+        let mut stages = self.lock();
+        if let Some(known) = stages.bars.iter().position(|(known, _)| *known == name) {
+            stages.current = known;
+            stages.bars[known].1.inc_length(total);
             return;
         }
-        current.bar.finish();
-        current.name = name;
-        if !self.terminal {
+        let bar = if self.terminal {
+            let style =
+                ProgressStyle::with_template("{msg:16} {bar:32} {percent:>3} %  {per_sec}, {eta} left");
+            let bar = stages.all.add(ProgressBar::new(total));
+            if let Ok(style) = style {
+                bar.set_style(style);
+            }
+            bar.set_message(name);
+            bar
+        } else {
             eprintln!("{name} ...");
-            return;
-        }
-        let style = ProgressStyle::with_template("{msg:16} {bar:32} {percent:>3} %  {per_sec}, {eta} left");
-        current.bar = ProgressBar::with_draw_target(Some(total.max(1)), ProgressDrawTarget::stderr());
-        if let Ok(style) = style {
-            current.bar.set_style(style);
-        }
-        current.bar.set_message(name);
+            ProgressBar::hidden()
+        };
+        stages.current = stages.bars.len();
+        stages.bars.push((name, bar));
     }
 
     fn advance(&self, units: u64) {
         if self.terminal && !self.quiet {
-            self.lock().bar.inc(units);
+            let stages = self.lock();
+            if let Some((_, bar)) = stages.bars.get(stages.current) {
+                bar.inc(units);
+            }
         }
     }
 

@@ -24,11 +24,22 @@ fn require_regular(path: &Path) -> Result<()> {
 /// Writes `bytes` beside `path` under a temporary name, flushes, then renames: readers see the old file or the new
 /// one, never a part.
 pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<()> {
+    replace(path, bytes, true)
+}
+
+/// As [`write_atomically`], but without waiting for the disk: for what can be made again.
+pub fn write_scratch(path: &Path, bytes: &[u8]) -> Result<()> {
+    replace(path, bytes, false)
+}
+
+fn replace(path: &Path, bytes: &[u8], flush: bool) -> Result<()> {
     let folder = parent(path);
     let fail = |e| Error::io("write", path, e);
     let mut file = tempfile::Builder::new().prefix(".diaphane-").tempfile_in(folder).map_err(fail)?;
     file.write_all(bytes).map_err(fail)?;
-    file.as_file().sync_all().map_err(fail)?;
+    if flush {
+        file.as_file().sync_all().map_err(fail)?;
+    }
     #[cfg(unix)]
     {
         use std::os::unix::fs::PermissionsExt;

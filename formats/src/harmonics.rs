@@ -16,6 +16,7 @@ use crate::sh::{MAX_ORDER, coefficient_count};
 use crate::{Error, Result};
 use half::f16;
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 /// Bits of a coefficient of `band`.
 pub const fn bits(band: usize) -> u32 {
@@ -54,7 +55,7 @@ const LEAST_PROFILE: f32 = 1e-5;
 const CLIPS: [f32; 4] = [1.0, 0.85, 0.7, 0.55];
 
 /// Quantised coefficients of many functions. Parallel arrays: one order and scale a function.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Harmonics {
     /// Bands, 0..=[`MAX_ORDER`].
     pub order: Vec<u8>,

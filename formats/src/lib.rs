@@ -25,6 +25,7 @@ pub mod lobe;
 pub mod material;
 pub mod medium;
 pub mod mesh;
+pub mod morton;
 pub mod phase;
 pub mod picture;
 pub mod reconstruct;

@@ -9,17 +9,18 @@ mod pool;
 pub(crate) use goal::Goal;
 
 use crate::field::Shape;
-use crate::fit::Cells;
 use crate::measure::play::{Player, Stored};
-use crate::measure::truth::Nodes;
-use crate::measure::{exact, views};
+use crate::measure::truth::{Nodes, Radiance};
+use crate::measure::views;
 use crate::progress::Stage;
 use crate::{Prepared, Result};
 use diaphane_formats::asset::{self, Asset, Certificate, CertifiedError};
 use diaphane_formats::directions::{even_directions, hash};
+use diaphane_formats::medium::Medium;
 use diaphane_formats::slopes::means_share;
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use pool::Pictures;
+use serde::{Deserialize, Serialize};
 
 /// Directions of view.
 const VIEWS: usize = 32;
@@ -28,52 +29,97 @@ const LIGHTS: usize = 18;
 /// Held-out lights that are played with exact light too: two for each channel, on both sides of the sphere.
 const EXACT: [usize; 6] = [0, 4, 8, 9, 13, 17];
 
-/// Measures `packed` with views, rays and lights drawn from `seed`.
+fn stream(seed: u64) -> u64 {
+    hash(seed, 71)
+}
+
+fn lights(seed: u64) -> Vec<DVec3> {
+    even_directions(LIGHTS, hash(stream(seed), 2))
+}
+
+/// The lights whose exact means over cells are played too: unit vector towards each, and its channel.
+pub(crate) fn exact_lights(seed: u64) -> Vec<(DVec3, usize)> {
+    let lights = lights(seed);
+    EXACT.iter().map(|l| (lights[*l], l % 3)).collect()
+}
+
+/// Radiance along the rays, before albedo and phase function, on which neither truth nor player depend otherwise.
+#[derive(Serialize, Deserialize)]
+pub(crate) struct Measured {
+    seed: u64,
+    /// Direction and number of rays of each view.
+    views: Vec<(DVec3, usize)>,
+    truth: Vec<Radiance>,
+    played: Vec<Vec<f32>>,
+    /// Under the exact lights.
+    with_exact_light: Vec<Vec<f32>>,
+}
+
+/// Plays `packed` with views, rays and lights drawn from `seed`; `exact` holds for each of [`exact_lights`] what arrives
+/// at the samples.
 pub(crate) fn measure(
     shape: &Shape<'_>,
     medium: &Prepared<'_>,
-    cells: &Cells,
+    exact: &[Vec<f32>],
     packed: &Asset,
     seed: u64,
     stage: Stage<'_>,
-) -> Result<Certificate> {
-    stage.announce(VIEWS + 2 * (LIGHTS + EXACT.len()));
+) -> Result<Measured> {
+    stage.announce(VIEWS + 2 * LIGHTS + EXACT.len());
     // As a reader gets it, after all rounding.
     let asset = asset::parse(&asset::encode(packed)?)?;
-    let stream = hash(seed, 71);
-    let views = views::views(shape, medium.medium.ior(), VIEWS, hash(stream, 1), stage)?;
-    let rays = views.iter().map(|v| v.rays.len() as u32).sum();
-    let lights = even_directions(LIGHTS, hash(stream, 2));
-    let nodes = Nodes::new(&views, medium, hash(stream, 3));
+    let views = views::views(shape, medium.medium.ior(), VIEWS, hash(stream(seed), 1), stage)?;
+    let lights = lights(seed);
+    let nodes = Nodes::new(&views, medium, hash(stream(seed), 3));
     let player = Player::new(&asset, &views);
-
     let truth = nodes.radiance(shape, medium, &lights, stage)?;
-    let means = means_share(asset.info.ratio());
     let stored = Stored::new(&asset, &lights);
-    let played = player.radiance(LIGHTS, |i, l| stored.arriving(i, l, l % 3), means, stage)?;
-    let pictures =
-        Pictures { views: &views, lights: &lights, phase: asset.info.phase, truth: &truth, played: &played };
+    let means = means_share(asset.info.ratio());
+    Ok(Measured {
+        seed,
+        views: views.iter().map(|v| (v.direction, v.rays.len())).collect(),
+        truth,
+        played: player.radiance(LIGHTS, |i, l| stored.arriving(i, l, l % 3), means, stage)?,
+        with_exact_light: player.radiance(EXACT.len(), |i, l| exact[l][i], Vec3::ONE, stage)?,
+    })
+}
 
-    let exact = exact::means(shape, medium, cells, &EXACT.map(|l| (lights[l], l % 3)), stage)?;
-    let played = player.radiance(EXACT.len(), |i, l| exact[l][i], Vec3::ONE, stage)?;
-    let exact_lights = EXACT.map(|l| lights[l]);
-    let exact_truth = EXACT.map(|l| truth[l].clone());
-    let near = Pictures { lights: &exact_lights, truth: &exact_truth, played: &played, ..pictures };
-
-    let error = pictures.figures().map(|figures| {
-        let with_exact_light = near.single(0..EXACT.len());
-        let with_stored_light = pictures.single(EXACT);
-        let share = match (with_exact_light, with_stored_light) {
-            (Some(exact), Some(stored)) if stored > 0.0 => (exact / stored).min(1.0),
-            _ => 1.0,
+impl Measured {
+    /// The certificate for the albedo and phase function of `medium`.
+    pub fn certificate(&self, medium: &Medium) -> Certificate {
+        let lights = lights(self.seed);
+        let pictures = Pictures {
+            views: &self.views,
+            lights: &lights,
+            albedo: medium.albedo(),
+            phase: medium.phase(),
+            truth: &self.truth,
+            played: &self.played,
         };
-        CertifiedError {
-            rel_rmse: figures.rel_rmse,
-            psnr_db: figures.psnr_db,
-            bias: figures.bias,
-            interpolation: figures.rel_rmse * share.sqrt(),
-            representation: figures.rel_rmse * (1.0 - share).sqrt(),
-        }
-    });
-    Ok(Certificate { error, rays, views: VIEWS as u32, lights: LIGHTS as u32, seed })
+        let exact_lights = EXACT.map(|l| lights[l]);
+        let exact_truth = EXACT.map(|l| self.truth[l].clone());
+        let near = Pictures {
+            lights: &exact_lights,
+            truth: &exact_truth,
+            played: &self.with_exact_light,
+            ..pictures
+        };
+        let error = pictures.figures().map(|figures| {
+            let with_exact_light = near.single(0..EXACT.len());
+            let with_stored_light = pictures.single(EXACT);
+            let share = match (with_exact_light, with_stored_light) {
+                (Some(exact), Some(stored)) if stored > 0.0 => (exact / stored).min(1.0),
+                _ => 1.0,
+            };
+            CertifiedError {
+                rel_rmse: figures.rel_rmse,
+                psnr_db: figures.psnr_db,
+                bias: figures.bias,
+                interpolation: figures.rel_rmse * share.sqrt(),
+                representation: figures.rel_rmse * (1.0 - share).sqrt(),
+            }
+        });
+        let rays = self.views.iter().map(|v| v.1 as u32).sum();
+        Certificate { error, rays, views: VIEWS as u32, lights: LIGHTS as u32, seed: self.seed }
+    }
 }

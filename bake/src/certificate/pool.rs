@@ -7,17 +7,18 @@
 //! [`crate::measure::truth`] in place of the squares and equal weight for every picture.
 
 use crate::measure::truth::Radiance;
-use crate::measure::views::View;
 use diaphane_formats::phase::Phase;
 use glam::DVec3;
 
 /// Truth and played radiance of all views and lights, light l in channel l % 3.
 #[derive(Clone, Copy)]
 pub(super) struct Pictures<'a> {
-    pub views: &'a [View],
+    /// Direction and number of rays of each view.
+    pub views: &'a [(DVec3, usize)],
     /// Unit vectors towards the lights.
     pub lights: &'a [DVec3],
-    /// Left out of the radiance below.
+    /// Per channel; left out of the radiance below, as the phase function.
+    pub albedo: DVec3,
     pub phase: Phase,
     /// Per light, per ray over all views.
     pub truth: &'a [Radiance],
@@ -81,7 +82,7 @@ impl Pictures<'_> {
     fn rays(&self) -> impl Iterator<Item = std::ops::Range<usize>> {
         self.views.iter().scan(0, |at, view| {
             let from = *at;
-            *at += view.rays.len();
+            *at += view.1;
             Some(from..*at)
         })
     }
@@ -102,9 +103,10 @@ impl Pictures<'_> {
             let (mut played, mut truth) = (0.0, [0.0; 2]);
             for &l in lights {
                 // Light travels against `lights`, the camera lies against the rays.
-                let phase = self.phase.value(self.lights[l].dot(self.views[view].direction));
-                played += phase * f64::from(self.played[l][ray]);
-                (0..2).for_each(|k| truth[k] += phase * f64::from(self.truth[l][ray][k]));
+                let phase = self.phase.value(self.lights[l].dot(self.views[view].0));
+                let scattered = self.albedo[l % 3] * phase;
+                played += scattered * f64::from(self.played[l][ray]);
+                (0..2).for_each(|k| truth[k] += scattered * f64::from(self.truth[l][ray][k]));
             }
             sums.square_error += (played - truth[0]) * (played - truth[1]) / count;
             sums.square += truth[0] * truth[1] / count;

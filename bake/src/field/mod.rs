@@ -14,25 +14,26 @@ use diaphane_formats::phase::Phase;
 use diaphane_formats::visibility::{Accel, project};
 use glam::DVec3;
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
-/// The mesh with its distance field.
+/// The mesh with what finds its surface.
 pub(crate) struct Shape<'a> {
     pub mesh: &'a Mesh,
     pub accel: Accel,
     pub diagonal: f64,
     /// Mean distance between samples if they filled the volume evenly.
     pub spacing: f64,
-    pub grid: DistanceGrid,
-    /// Grid nodes that needed no distance query.
-    pub skipped_nodes: usize,
 }
 
 /// Depth at the nodes of a regular grid.
+#[derive(Serialize, Deserialize)]
 pub(crate) struct DistanceGrid {
     pub size: [usize; 3],
     pub origin: DVec3,
     pub cell: f64,
     pub depth: Vec<f32>,
+    /// Nodes that needed no distance query.
+    pub skipped: usize,
 }
 
 impl DistanceGrid {
@@ -57,19 +58,29 @@ impl DistanceGrid {
 }
 
 impl<'a> Shape<'a> {
-    pub fn new(mesh: &'a Mesh, params: &Params, stage: Stage<'_>) -> Result<Self> {
-        let accel = Accel::new(mesh);
-        let diagonal = mesh.diagonal();
+    pub fn new(mesh: &'a Mesh, params: &Params) -> Self {
         let spacing = (mesh.volume() / params.samples as f64).cbrt();
+        Self { mesh, accel: Accel::new(mesh), diagonal: mesh.diagonal(), spacing }
+    }
+}
+
+/// Cells of the grid along the longest edge of the box: fine enough for the samples, never so fine that the grid dominates
+/// the bake.
+pub(crate) fn grid_cells(mesh: &Mesh, samples: usize) -> f64 {
+    let (low, high) = mesh.bounds();
+    let spacing = (mesh.volume() / samples as f64).cbrt();
+    ((high - low).max_element() / (0.6 * spacing)).clamp(24.0, 80.0)
+}
+
+impl DistanceGrid {
+    pub fn new(shape: &Shape<'_>, cells: f64, stage: Stage<'_>) -> Result<Self> {
+        let Shape { mesh, accel, .. } = shape;
         let (low, high) = mesh.bounds();
         let extent = high - low;
-        // Fine enough for the samples, never so fine that the grid dominates the bake.
-        let longest = extent.max_element();
-        let cells = (longest / (0.6 * spacing)).clamp(24.0, 80.0);
-        let cell = longest / cells;
+        let cell = extent.max_element() / cells;
         let origin = low - 1.5 * cell;
         let size = [extent.x, extent.y, extent.z].map(|e| (e / cell).ceil() as usize + 4);
-        let mut grid = DistanceGrid { size, origin, cell, depth: Vec::new() };
+        let mut grid = Self { size, origin, cell, depth: Vec::new(), skipped: 0 };
         let count = size.iter().product::<usize>();
         stage.announce(count);
         let nodes: Vec<DVec3> = (0..count).map(|i| grid.node(i)).collect();
@@ -104,8 +115,8 @@ impl<'a> Shape<'a> {
         if !grid.depth.iter().any(|d| *d > 0.0) && mesh.volume() <= 0.0 {
             return Err(Error::NoRoom("it has no inside".to_owned()));
         }
-        let skipped_nodes = skipped.into_inner();
-        Ok(Self { mesh, accel, diagonal, spacing, grid, skipped_nodes })
+        grid.skipped = skipped.into_inner();
+        Ok(grid)
     }
 }
 

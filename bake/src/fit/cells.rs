@@ -97,13 +97,23 @@ impl Cells {
         &self.points
     }
 
+    /// What the asset stores of the centroids: how far they lie from `samples`, in 127ths of a radius.
+    pub fn offsets(&self, samples: &[Candidate]) -> Vec<[i8; 4]> {
+        let one = |(i, s): (usize, &Candidate)| {
+            let offset = ((self.centroid(i) - s.position) * (127.0 / s.radius)).round();
+            let [x, y, z] = offset.clamp(DVec3::splat(-127.0), DVec3::splat(127.0)).to_array();
+            [x as i8, y as i8, z as i8, 0]
+        };
+        samples.iter().enumerate().map(one).collect()
+    }
+
     /// The points of sample `i`.
-    pub fn of(&self, i: usize) -> &[DVec3] {
+    fn of(&self, i: usize) -> &[DVec3] {
         &self.points[i * self.size..(i + 1) * self.size]
     }
 
     /// The mean of the points of sample `i`: where its values hold.
-    pub fn centroid(&self, i: usize) -> DVec3 {
+    fn centroid(&self, i: usize) -> DVec3 {
         self.of(i).iter().sum::<DVec3>() / self.size as f64
     }
 
@@ -111,15 +121,6 @@ impl Cells {
     pub fn turn(&self, turn: usize, count: usize) -> Vec<DVec3> {
         let stride = self.size / count;
         self.points.iter().skip(turn % stride).step_by(stride).copied().collect()
-    }
-
-    /// Keeps the samples that `keep` says.
-    pub fn retain(&mut self, keep: &[bool]) {
-        let mut cell = 0;
-        self.points.retain(|_| {
-            cell += 1;
-            keep[(cell - 1) / self.size]
-        });
     }
 }
 

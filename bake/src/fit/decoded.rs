@@ -120,6 +120,23 @@ macro_rules! sum {
 }
 pub(super) use sum;
 
+/// Sums and differences of both halves.
+pub(super) fn butterfly(values: &mut [f32]) {
+    let (left, right) = values.split_at_mut(values.len() / 2);
+    Arch::new().dispatch(
+        #[inline(always)]
+        || left.iter_mut().zip(right).for_each(|(a, b)| (*a, *b) = (*a + *b, *a - *b)),
+    );
+}
+
+/// Multiplies by the squares of the weights.
+pub(super) fn times_square(values: &mut [f32], weight: &[f32]) {
+    Arch::new().dispatch(
+        #[inline(always)]
+        || values.iter_mut().zip(weight).for_each(|(v, w)| *v *= w * w),
+    );
+}
+
 /// What a step of the fit needs of one function.
 pub(super) struct Linear<'a> {
     /// √c dψ̂/dy, c being the [`importance`]; at least the floors.

@@ -6,41 +6,51 @@
 //! that see 3 of 12).
 
 use super::cells::{Cells, buried, nearest};
+use crate::cache::bytes;
 use crate::field::Shape;
+use crate::measure::exact;
 use crate::params::{DARK, Params, Visibility};
 use crate::progress::Stage;
-use crate::samples::{Candidate, Placed};
-use crate::{Error, Prepared, Result, visibility};
+use crate::samples::Candidate;
+use crate::{Prepared, Result, visibility};
 use diaphane_formats::approx::exp;
 use diaphane_formats::directions::{even_directions, hash};
 use diaphane_formats::slopes::CELL_RADIUS;
 use diaphane_formats::visibility::{DepthRows, Nearest};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
-/// Samples that receive light, with their transmittance.
+/// What the samples of one block see.
+#[derive(Serialize, Deserialize)]
 pub(crate) struct Lit {
-    pub samples: Vec<Candidate>,
-    /// What each sample stands for.
-    pub cells: Cells,
+    /// Which of the block's samples receive light and are inside: all that follows is of those alone.
+    pub keep: Vec<bool>,
     /// Unit vector towards the nearest surface, 0 for samples further from it than [`NEAR`] radii.
     pub surface: Vec<Vec3>,
-    pub probes: Vec<Candidate>,
-    /// Unit vectors: the first half, then their opposites in the same order.
-    pub directions: Vec<DVec3>,
-    /// ψ at the reference extinction, mean over some of each sample's points, row-major [sample][direction].
-    pub transmittance: Vec<f32>,
-    /// Fresnel transmittance products in the same order, weighted by ψ; empty when index matched.
-    pub boundary: Vec<f32>,
-    /// Samples dropped because they turned out dark or outside.
-    pub discarded: usize,
-    pub snapped: usize,
-    pub dark_candidates: usize,
+    /// Where the means hold, as the asset stores it.
+    pub offset: Vec<[i8; 4]>,
+    /// ψ at the reference extinction in units of 1/[`ONE`], mean over some of each sample's points, row-major
+    /// [sample][direction].
+    #[serde(with = "bytes")]
+    pub transmittance: Vec<u16>,
+    /// Fresnel transmittance products in the same order and unit, weighted by ψ; empty when index matched.
+    #[serde(with = "bytes")]
+    pub boundary: Vec<u16>,
+    /// For each held-out light the mean of ψβ over all points of every sample.
+    pub held_out: Vec<Vec<f32>>,
     /// Samples so deep inside that none of their points was tested.
     pub buried: usize,
-    pub rays: u64,
-    /// How depths were found.
-    pub visibility: &'static str,
+    /// Pairs of a sample and a direction in which it is dark.
+    pub dark: usize,
+}
+
+/// 1 in the unit of transmittances. Fits count absolute errors, so that fixed point serves them better than the floating
+/// point of the same size.
+pub(crate) const ONE: f32 = 65535.0;
+
+fn fixed(value: f32) -> u16 {
+    (value * ONE + 0.5) as u16
 }
 
 /// Points of a cell, of which every direction sees its share.
@@ -52,43 +62,65 @@ const NEAR: f64 = 2.0;
 /// Pairs of opposite directions projected before their rows are turned into columns: bounds the memory of the rows.
 const GROUP: usize = 8;
 
+/// Unit vectors in which samples are lit: the first ones of opposite pairs, then their opposites in the same order.
+pub(crate) fn directions(params: &Params) -> Vec<DVec3> {
+    let pairs = even_directions(params.directions.next_multiple_of(2), hash(params.seed, 31));
+    pairs.iter().step_by(2).chain(pairs.iter().skip(1).step_by(2)).copied().collect()
+}
+
+/// How depths are found for so many samples in all.
+pub(crate) fn method(params: &Params, samples: usize, triangles: usize) -> Visibility {
+    visibility::chosen(params.visibility, samples * params.points_per_sample, triangles)
+}
+
+/// One block.
+pub(crate) struct Task<'a> {
+    pub samples: &'a [Candidate],
+    /// Its number.
+    pub block: usize,
+    /// The same for all blocks.
+    pub method: Visibility,
+    /// Lights whose means over all points are wanted: unit vector towards each, and its channel.
+    pub held_out: &'a [(DVec3, usize)],
+}
+
+/// What the samples of a block see.
 pub(crate) fn depths(
     shape: &Shape<'_>,
     medium: &Prepared<'_>,
-    placed: Placed,
+    task: &Task<'_>,
     params: &Params,
     stage: Stage<'_>,
 ) -> Result<Lit> {
-    let pairs = even_directions(params.directions.next_multiple_of(2), hash(params.seed, 31));
-    let forward: Vec<DVec3> = pairs.iter().step_by(2).copied().collect();
-    let half = forward.len();
-    let directions: Vec<DVec3> = forward.iter().copied().chain(forward.iter().map(|d| -*d)).collect();
+    let Task { samples, block, method, held_out } = *task;
+    let directions = directions(params);
+    let (n, d) = (samples.len(), directions.len());
+    let half = d / 2;
     let count = params.points_per_sample;
     let size = if count == 1 { 1 } else { POOL.next_multiple_of(count) };
-    let nearest = nearest(shape, &placed.samples, NEAR.max(f64::from(CELL_RADIUS)));
-    let buried = buried(&placed.samples, &nearest);
-    let mut cells = Cells::new(shape, medium.medium, &placed.samples, &buried, size, hash(params.seed, 37))?;
-    let (n, d) = (placed.samples.len(), directions.len());
-    stage.announce(half);
+    let nearest = nearest(shape, samples, NEAR.max(f64::from(CELL_RADIUS)));
+    let buried = buried(samples, &nearest);
+    let seed = hash(hash(params.seed, 37), block as u64);
+    let cells = Cells::new(shape, medium.medium, samples, &buried, size, seed)?;
     let matched = medium.medium.ior() == 1.0;
     let kappa = medium.medium.reference_extinction() as f32;
-    let mut transmittance = vec![0.0f32; n * d];
-    let mut boundary = vec![1.0f32; if matched { 0 } else { n * d }];
+    let mut transmittance = vec![0u16; n * d];
+    let mut boundary = vec![u16::MAX; if matched { 0 } else { n * d }];
     let mut outside_votes = vec![0u32; n];
-    for (g, group) in forward.chunks(GROUP).enumerate() {
+    for (g, group) in directions[..half].chunks(GROUP).enumerate() {
         let rows: Vec<Row> = group
             .par_iter()
             .enumerate()
             .map(|(k, axis)| {
                 let points = cells.turn(g * GROUP + k, count);
-                let rows = visibility::depths(shape, medium, params.visibility, &points, *axis);
+                let rows = visibility::depths(shape, medium, method, &points, *axis);
                 stage.step(1)?;
                 Ok(Row::new(&rows, kappa, count))
             })
             .collect::<Result<_>>()?;
-        let columns = |out: &mut [f32], value: &dyn Fn(&Row, usize) -> f32| {
+        let columns = |out: &mut [u16], value: &dyn Fn(&Row, usize) -> f32| {
             for (k, row) in rows.iter().enumerate() {
-                (0..2).for_each(|side| out[side * half + g * GROUP + k] = value(row, side));
+                (0..2).for_each(|side| out[side * half + g * GROUP + k] = fixed(value(row, side)));
             }
         };
         transmittance.par_chunks_mut(d).zip(&mut outside_votes).enumerate().for_each(|(i, (out, votes))| {
@@ -104,46 +136,34 @@ pub(crate) fn depths(
         .into_par_iter()
         .map(|i| {
             let psi = &transmittance[i * d..(i + 1) * d];
-            let through = |k: usize| boundary.get(i * d + k).copied().unwrap_or(1.0);
-            let light: f32 = psi.iter().enumerate().map(|(k, psi)| psi * through(k)).sum();
+            let through = |k: usize| boundary.get(i * d + k).map_or(1.0, |b| f32::from(*b) / ONE);
+            let light: f32 = psi.iter().enumerate().map(|(k, psi)| f32::from(*psi) / ONE * through(k)).sum();
             // The layers decided before; the mean over the points of a sample on the boundary of a dense medium may lie
             // far below, yet it is all the light there is: only what is dark beyond doubt goes now.
             let outside = 2 * outside_votes[i] as usize > d * count;
             f64::from(light) / d as f64 >= 1e-3 * DARK && !outside
         })
         .collect();
-    let kept = keep.iter().filter(|k| **k).count();
-    if kept == 0 {
-        return Err(Error::NoRoom("no light reaches its inside".to_owned()));
-    }
-    if kept < n {
+    let mut held_out = exact::means(shape, medium, &cells, held_out, stage)?;
+    let mut offset = cells.offsets(samples);
+    let mut surface: Vec<Vec3> =
+        samples.iter().zip(&nearest).map(|(s, n)| towards_surface(shape, s, *n)).collect();
+    if keep.iter().any(|k| !k) {
         compact(&mut transmittance, &keep, d);
-        if !matched {
-            compact(&mut boundary, &keep, d);
-        }
-        cells.retain(&keep);
+        compact(&mut boundary, &keep, if matched { 0 } else { d });
+        held_out.iter_mut().for_each(|light| compact(light, &keep, 1));
+        compact(&mut offset, &keep, 1);
+        compact(&mut surface, &keep, 1);
     }
-    let samples: Vec<Candidate> = (0..n).filter(|i| keep[*i]).map(|i| placed.samples[i]).collect();
     Ok(Lit {
-        surface: (0..n)
-            .filter(|i| keep[*i])
-            .map(|i| towards_surface(shape, &placed.samples[i], nearest[i]))
-            .collect(),
-        buried: buried.iter().filter(|b| **b).count(),
-        samples,
-        cells,
-        probes: placed.probes,
-        directions,
+        surface,
+        offset,
+        dark: transmittance.iter().filter(|psi| **psi == 0).count(),
         transmittance,
         boundary,
-        discarded: n - kept,
-        snapped: placed.snapped,
-        dark_candidates: placed.dark,
-        rays: (n * count * d) as u64,
-        visibility: match visibility::chosen(params.visibility, n * count, shape.mesh.triangles.len()) {
-            Visibility::Trace => "trace",
-            _ => "project",
-        },
+        held_out,
+        buried: buried.iter().filter(|b| **b).count(),
+        keep,
     })
 }
 
@@ -196,7 +216,8 @@ fn towards_surface(shape: &Shape<'_>, sample: &Candidate, nearest: Option<Neares
     direction.as_vec3()
 }
 
-fn compact(values: &mut Vec<f32>, keep: &[bool], width: usize) {
+/// Keeps the rows of `width` values that `keep` says.
+fn compact<T: Copy>(values: &mut Vec<T>, keep: &[bool], width: usize) {
     let mut to = 0;
     for (from, _) in keep.iter().enumerate().filter(|(_, k)| **k) {
         values.copy_within(from * width..(from + 1) * width, to * width);

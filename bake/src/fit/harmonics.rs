@@ -11,8 +11,9 @@
 //! 0.055 without, 0.050 where all samples have one). What is kept is quantised ([`diaphane_formats::harmonics`]).
 
 use super::boundary::{BOUNDARY_ORDER, boundary};
-use super::depths::Lit;
+use super::depths::{Lit, directions};
 use super::least_squares::{BATCH, Basis, Batch, coefficient_places, in_order};
+use super::levels::Levels;
 use super::rounding::Rounding;
 use crate::Result;
 use crate::params::{Params, Representation};
@@ -20,11 +21,14 @@ use crate::progress::Stage;
 use diaphane_formats::encoding::Encoding;
 use diaphane_formats::harmonics::{Coefficients, Harmonics, bytes};
 use diaphane_formats::lobe;
+use diaphane_formats::sh::coefficient_count;
 use glam::Vec3;
 use ndarray::Array2;
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 /// The light of all samples.
+#[derive(Serialize, Deserialize)]
 pub(crate) struct Light {
     pub encoding: Encoding,
     pub depth: Harmonics,
@@ -41,8 +45,34 @@ impl Light {
     }
 }
 
+/// The fits of some samples, in their order.
+#[derive(Serialize, Deserialize)]
+pub(crate) struct Fits {
+    /// What is fitted: one choice for all samples of an asset.
+    pub encoding: Encoding,
+    order: Vec<u8>,
+    /// `order`² coefficients of each sample.
+    values: Vec<f32>,
+    lobe: Vec<Vec3>,
+    /// Coefficients of the boundary's transmittance, as many for each sample; empty when index matched.
+    boundary: Vec<f32>,
+}
+
+impl Fits {
+    /// Those of more samples behind these.
+    pub fn append(&mut self, more: Self) {
+        self.order.extend(more.order);
+        self.values.extend(more.values);
+        self.lobe.extend(more.lobe);
+        self.boundary.extend(more.boundary);
+    }
+}
+
 /// Gauss-Newton steps of an order that may turn out too low, and of the last.
 const STEPS: [usize; 2] = [3, 8];
+/// Steps in a part of the directions, and those in all directions after them.
+const IN_PART: usize = 6;
+const AFTER_PART: usize = 3;
 /// Lowest order that is tried.
 const LEAST_ORDER: usize = 2;
 /// Samples of one task.
@@ -67,12 +97,13 @@ struct Fitted {
     error: f32,
 }
 
-pub(crate) fn harmonics(lit: &Lit, params: &Params, stage: Stage<'_>) -> Result<Light> {
-    stage.announce(lit.samples.len());
-    let basis = Basis::new(&lit.directions, params.peak_order().max(BOUNDARY_ORDER));
-    let encoding = encoding(lit, &basis, params);
-    let fitter = Fitter { lit, basis: &basis, encoding, params };
-    let all: Vec<usize> = (0..lit.samples.len()).collect();
+/// Fits the samples of a block; `encoding` is what a block before chose.
+pub(crate) fn fits(lit: &Lit, encoding: Option<Encoding>, params: &Params, stage: Stage<'_>) -> Result<Fits> {
+    let directions = directions(params);
+    let levels = Levels::new(&directions, params.peak_order().max(BOUNDARY_ORDER));
+    let encoding = encoding.unwrap_or_else(|| chosen(lit, &levels, params));
+    let fitter = Fitter { lit, levels: &levels, encoding, params };
+    let all: Vec<usize> = (0..lit.surface.len()).collect();
     let tasks: Vec<Vec<Fitted>> = all
         .par_chunks(TASK)
         .map(|samples| {
@@ -82,24 +113,48 @@ pub(crate) fn harmonics(lit: &Lit, params: &Params, stage: Stage<'_>) -> Result<
         })
         .collect::<Result<_>>()?;
     let mut fitted: Vec<Fitted> = tasks.into_iter().flatten().collect();
-    fitter.lend(&mut fitted);
-    let mut depth = Coefficients::zeros(fitted.iter().map(|f| f.order as u8).collect());
-    for (i, f) in fitted.iter().enumerate() {
-        depth.of_mut(i).copy_from_slice(&f.coefficients);
-    }
-    let stored = |f: &Fitted| lobe::vector(lobe::code(f.lobe));
-    let lobe = if encoding.has_lobe() { fitted.iter().map(stored).collect() } else { Vec::new() };
+    fitter.lend(&mut fitted, stage)?;
+    Ok(Fits {
+        encoding,
+        order: fitted.iter().map(|f| f.order as u8).collect(),
+        values: fitted.iter().flat_map(|f| &f.coefficients).copied().collect(),
+        lobe: fitted.iter().map(|f| f.lobe).collect(),
+        boundary: boundary(lit, &levels.all.basis, params, directions.len()),
+    })
+}
+
+/// The fits of all samples in few bytes.
+pub(crate) fn quantised(fits: Fits, params: &Params, stage: Stage<'_>) -> Result<Light> {
+    let Fits { encoding, order, values, lobe, boundary } = fits;
+    let directions = directions(params);
+    let stored = |vector: &Vec3| lobe::vector(lobe::code(*vector));
+    let lobe: Vec<Vec3> = if encoding.has_lobe() { lobe.iter().map(stored).collect() } else { Vec::new() };
+    let boundary = match boundary.len() / order.len().max(1) {
+        0 => Harmonics::default(),
+        each => {
+            Coefficients { values: boundary, ..Coefficients::zeros(vec![each.isqrt() as u8; order.len()]) }
+                .quantised()
+        }
+    };
+    let exact = Coefficients { values, ..Coefficients::zeros(order) };
+    let basis = Basis::new(&directions, params.peak_order());
     let rounding = Rounding::new(&basis, params.peak_order(), encoding);
-    let depth = depth.quantised_by(|i, book, codes| {
+    stage.announce(exact.len());
+    let depth = exact.quantised_by(|i, book, codes| {
+        if stage.step(1).is_err() {
+            return;
+        }
         let lobe = lobe.get(i).copied().unwrap_or(Vec3::ZERO);
-        let beside = |d: usize| lobe.dot(lit.directions[d].as_vec3()).max(0.0);
-        rounding.choose(&fitted[i].coefficients, beside, book, codes);
+        let beside = |d: usize| lobe.dot(directions[d].as_vec3()).max(0.0);
+        rounding.choose(exact.of(i), beside, book, codes);
     });
-    Ok(Light { encoding, depth, lobe, boundary: boundary(lit, &basis, params) })
+    // Whoever asked to stop gets no half-rounded asset.
+    stage.step(0)?;
+    Ok(Light { encoding, depth, lobe, boundary })
 }
 
 /// What is stored; ε is the one that fits some samples best.
-fn encoding(lit: &Lit, basis: &Basis, params: &Params) -> Encoding {
+fn chosen(lit: &Lit, levels: &Levels, params: &Params) -> Encoding {
     let with = |epsilon: f32| match params.representation {
         Representation::Transmittance => Encoding::Transmittance,
         Representation::Depth => Encoding::Depth,
@@ -107,9 +162,9 @@ fn encoding(lit: &Lit, basis: &Basis, params: &Params) -> Encoding {
         Representation::Lobe => Encoding::Lobe { epsilon },
     };
     let trial: Vec<usize> =
-        (0..lit.samples.len()).step_by(lit.samples.len().div_ceil(TRIAL).max(1)).collect();
+        (0..lit.surface.len()).step_by(lit.surface.len().div_ceil(TRIAL).max(1)).collect();
     let error = |epsilon: &f32| -> f64 {
-        let fitter = Fitter { lit, basis, encoding: with(*epsilon), params };
+        let fitter = Fitter { lit, levels, encoding: with(*epsilon), params };
         let batch = |group: &[usize]| -> f64 {
             let none = Fitted::default();
             let fitted = fitter.plain(group, &vec![&none; group.len()], params.order, STEPS[1]);
@@ -135,7 +190,7 @@ fn ladder(highest: usize) -> Vec<usize> {
 /// What all fits share.
 struct Fitter<'a> {
     lit: &'a Lit,
-    basis: &'a Basis,
+    levels: &'a Levels,
     encoding: Encoding,
     params: &'a Params,
 }
@@ -187,10 +242,10 @@ impl Fitter<'_> {
     }
 
     /// Gives the samples that miss the target most the bytes that others left: as much as if all had all bands.
-    fn lend(&self, fitted: &mut [Fitted]) {
+    fn lend(&self, fitted: &mut [Fitted], stage: Stage<'_>) -> Result<()> {
         let (order, peak) = (self.params.order, self.params.peak_order());
         if peak <= order {
-            return;
+            return Ok(());
         }
         let size = |f: &Fitted| bytes(f.order) + if f.lobe == Vec3::ZERO { 0 } else { LOBE_BYTES };
         let used: usize = fitted.iter().map(size).sum();
@@ -209,43 +264,33 @@ impl Fitter<'_> {
             .par_chunks(TASK)
             .map(|group| {
                 let before: Vec<&Fitted> = group.iter().map(|i| &fitted[*i]).collect();
-                self.plain(group, &before, peak, STEPS[1])
+                stage.step(0)?;
+                Ok(self.plain(group, &before, peak, STEPS[1]))
             })
-            .collect();
+            .collect::<Result<_>>()?;
         for (i, new) in needy.iter().zip(better.into_iter().flatten()) {
             if self.held_out(&new) < self.held_out(&fitted[*i]) {
                 fitted[*i] = new;
             }
         }
+        Ok(())
     }
 
     /// The error to expect in other directions: generalised cross-validation (Golub, Heath and Wahba 1979).
     fn held_out(&self, fitted: &Fitted) -> f32 {
         let unknowns = fitted.coefficients.len() + usize::from(fitted.lobe != Vec3::ZERO);
-        fitted.error / (1.0 - unknowns as f32 / self.lit.directions.len() as f32).max(0.1)
-    }
-
-    /// Transmittances, row-major [sample][direction].
-    fn rows(&self, samples: &[usize]) -> Array2<f32> {
-        let columns = self.lit.directions.len();
-        Array2::from_shape_fn((samples.len(), columns), |(q, d)| {
-            self.lit.transmittance[samples[q] * columns + d]
-        })
+        fitted.error / (1.0 - unknowns as f32 / self.levels.all.columns.len() as f32).max(0.1)
     }
 
     /// Harmonics alone, from the coefficients of a lower order where there are any.
     fn plain(&self, samples: &[usize], before: &[&Fitted], order: usize, steps: usize) -> Vec<Fitted> {
-        let psi = self.rows(samples);
-        let batch = Batch { basis: self.basis.bands(order), lobe: None };
         let places = coefficient_places(order);
-        let mut x = if before.iter().all(|b| !b.coefficients.is_empty()) {
-            Array2::from_shape_fn((psi.nrows(), batch.unknowns()), |(q, k)| {
+        let start = before.iter().all(|b| !b.coefficients.is_empty()).then(|| {
+            Array2::from_shape_fn((samples.len(), places.len()), |(q, k)| {
                 before[q].coefficients.get(places[k]).copied().unwrap_or(0.0)
             })
-        } else {
-            batch.start(self.encoding, &psi)
-        };
-        let errors = batch.improve(self.encoding, &psi, steps, &mut x);
+        });
+        let (x, errors) = self.solve(samples, order, false, start, steps);
         let one = |(q, error): (usize, f32)| Fitted {
             order,
             coefficients: in_order(&places, x.row(q).iter()),
@@ -257,21 +302,43 @@ impl Fitter<'_> {
 
     /// Harmonics beside a lobe towards the nearest surface; none where it would take light away.
     fn with_lobe(&self, samples: &[usize], order: usize) -> Vec<Fitted> {
-        let psi = self.rows(samples);
-        let axis = |q: usize| self.lit.surface[samples[q]];
-        let lobe =
-            Array2::from_shape_fn(psi.dim(), |(q, d)| axis(q).dot(self.lit.directions[d].as_vec3()).max(0.0));
-        let batch = Batch { basis: self.basis.bands(order), lobe: Some(&lobe) };
         let places = coefficient_places(order);
-        let mut x = batch.start(self.encoding, &psi);
-        let errors = batch.improve(self.encoding, &psi, STEPS[1], &mut x);
+        let (x, errors) = self.solve(samples, order, true, None, STEPS[1]);
         let one = |(q, error): (usize, f32)| Fitted {
             order,
             coefficients: in_order(&places, x.row(q).iter()),
-            lobe: axis(q) * x[[q, places.len()]].max(0.0),
+            lobe: self.lit.surface[samples[q]] * x[[q, places.len()]].max(0.0),
             error,
         };
         errors.into_iter().enumerate().map(one).collect()
+    }
+
+    /// Unknowns and errors of all samples, in a part of the directions first where that is enough.
+    fn solve(
+        &self,
+        samples: &[usize],
+        order: usize,
+        with_lobe: bool,
+        start: Option<Array2<f32>>,
+        steps: usize,
+    ) -> (Array2<f32>, Vec<f32>) {
+        let width = self.levels.all.columns.len();
+        let unknowns = coefficient_count(order) + usize::from(with_lobe);
+        let (mut x, mut errors) = (start, Vec::new());
+        let plan = match self.levels.part(unknowns).filter(|_| steps == STEPS[1]) {
+            Some(part) => vec![(part, IN_PART), (&self.levels.all, AFTER_PART)],
+            None => vec![(&self.levels.all, steps)],
+        };
+        for (level, steps) in plan {
+            let psi =
+                level.gathered(samples.iter().map(|i| &self.lit.transmittance[i * width..(i + 1) * width]));
+            let lobe = with_lobe.then(|| level.cosines(samples.iter().map(|i| self.lit.surface[*i])));
+            let batch = Batch { basis: level.basis.bands(order), lobe: lobe.as_ref() };
+            let mut now = x.take().unwrap_or_else(|| batch.start(self.encoding, &psi));
+            errors = batch.improve(self.encoding, &psi, steps, &mut now);
+            x = Some(now);
+        }
+        (x.unwrap_or_default(), errors)
     }
 }
 

@@ -3,30 +3,30 @@
 //!
 //! For values y = B x (B: directions × coefficients) decoded to ψ̂(y) it minimises Σ_ω c (ψ̂ - ψ)², c being the importance
 //! of the step before (iteratively reweighted least squares). A step solves
-//! min |g (B d) - (ψ - ψ̂)|² + λ |d|² with g = dψ̂/dy. B has nearly orthogonal columns and g lies within 0..1, so six
+//! min |g (B d) - (ψ - ψ̂)|² + λ |d|² with g = dψ̂/dy. B has nearly orthogonal columns and g lies within 0..1, so four
 //! iterations suffice and no normal matrix is ever formed.
 //!
 //! Directions come in opposite pairs, all first ones before all second ones, and Y_lm(-ω) = (-1)^l Y_lm(ω): with E and O
 //! the parts of even and odd bands in the first half, y = E + O there and E - O opposite. Both products therefore take
 //! half the multiplications. Unknowns are kept in that order: even bands, then odd ones.
 
-use super::decoded::{Linear, SLOPE_RIGHT, error, error_along, linearise, slopes};
+use super::decoded::{Linear, SLOPE_RIGHT, butterfly, error, error_along, linearise, slopes, times_square};
 use diaphane_formats::encoding::Encoding;
 use diaphane_formats::sh::{coefficient_count, evaluate};
 use glam::DVec3;
 use ndarray::linalg::general_mat_mul;
-use ndarray::{Array2, ArrayView1, ArrayView2, ArrayViewMut1, ArrayViewMut2, Axis, Slice, Zip};
+use ndarray::{Array2, ArrayView1, ArrayView2, ArrayViewMut1, Axis, Slice, Zip};
 
 /// Functions fitted together: their values stay in the cache.
 pub(super) const BATCH: usize = 32;
 
 /// Iterations of a step, and of a linear problem that is solved once.
-pub(super) const INNER: usize = 6;
+pub(super) const INNER: usize = 4;
 pub(super) const ALONE: usize = 12;
 const DAMPING: f32 = 1e-4;
 const MOST_DAMPING: f32 = 1.0;
 /// An improvement smaller than this fraction ends a fit.
-const ENOUGH: f32 = 2e-3;
+const ENOUGH: f32 = 1e-2;
 
 /// Harmonics in the first half of the directions, by parity.
 pub(super) struct Basis {
@@ -112,7 +112,7 @@ impl Batch<'_> {
         let part = |from: usize, to: usize| x.slice_axis(Axis(1), Slice::from(from..to));
         general_mat_mul(1.0, &part(0, even), &self.basis[0].t(), 0.0, &mut left);
         general_mat_mul(1.0, &part(even, n), &self.basis[1].t(), 0.0, &mut right);
-        butterfly(&mut left, &mut right);
+        y.rows_mut().into_iter().for_each(|row| butterfly(slice_mut(row)));
         if let Some(lobe) = self.lobe {
             for ((mut y, lobe), x) in y.rows_mut().into_iter().zip(lobe.rows()).zip(x.column(n)) {
                 y.scaled_add(*x, &lobe);
@@ -128,9 +128,9 @@ impl Batch<'_> {
                 *x = y.dot(&lobe);
             }
         }
-        let (mut left, mut right) = y.view_mut().split_at(Axis(1), self.basis[0].nrows());
-        butterfly(&mut left, &mut right);
-        let mut part = |from: usize, to: usize, y: &ArrayViewMut2<'_, f32>, basis: &ArrayView2<'_, f32>| {
+        y.rows_mut().into_iter().for_each(|row| butterfly(slice_mut(row)));
+        let (left, right) = y.view().split_at(Axis(1), self.basis[0].nrows());
+        let mut part = |from: usize, to: usize, y: &ArrayView2<'_, f32>, basis: &ArrayView2<'_, f32>| {
             general_mat_mul(1.0, y, basis, 0.0, &mut x.slice_axis_mut(Axis(1), Slice::from(from..to)));
         };
         part(0, even, &left, &self.basis[0]);
@@ -160,7 +160,9 @@ impl Batch<'_> {
         let mut size = first.clone();
         for _ in 0..iterations {
             self.forward(&step, &mut values);
-            Zip::from(&mut values).and(weight).for_each(|v, w| *v *= w * w);
+            for (values, weight) in values.rows_mut().into_iter().zip(weight.rows()) {
+                times_square(slice_mut(values), slice(weight));
+            }
             self.backward(&mut values, &mut curved);
             let mut open = false;
             for q in 0..rows {
@@ -266,11 +268,6 @@ fn slice<'a>(row: ArrayView1<'a, f32>) -> &'a [f32] {
 /// As above, to be written.
 fn slice_mut<'a>(row: ArrayViewMut1<'a, f32>) -> &'a mut [f32] {
     row.into_slice().unwrap_or(&mut [])
-}
-
-/// Sums and differences of both halves.
-fn butterfly(left: &mut ArrayViewMut2<'_, f32>, right: &mut ArrayViewMut2<'_, f32>) {
-    Zip::from(left).and(right).for_each(|a, b| (*a, *b) = (*a + *b, *a - *b));
 }
 
 /// The stored value of ψ; depths beyond sight are all the same.

@@ -6,11 +6,12 @@ mod decoded;
 mod depths;
 mod harmonics;
 mod least_squares;
+mod levels;
 mod rounding;
 mod weights;
 
 pub(crate) use boundary::boundary_order;
 pub(crate) use cells::{Cells, buried, nearest};
-pub(crate) use depths::{Lit, depths};
-pub(crate) use harmonics::{Light, harmonics};
+pub(crate) use depths::{Lit, Task, depths, method};
+pub(crate) use harmonics::{Fits, Light, fits, quantised};
 pub(crate) use weights::weights;

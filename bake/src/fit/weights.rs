@@ -5,14 +5,18 @@
 
 use crate::Result;
 use crate::progress::Stage;
-use crate::samples::Candidate;
+use crate::samples::{Candidate, Probe};
 use diaphane_formats::kernel;
 use diaphane_formats::reconstruct::Cloud;
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use half::f16;
 use rayon::prelude::*;
 
-const ITERATIONS: usize = 60;
+/// Measured on four objects with 50,000 samples: the interpolation error is as after 60 to within 1 %.
+const ITERATIONS: usize = 20;
+
+/// Probes of one task.
+const PART: usize = 4096;
 
 /// A sparse matrix by rows.
 struct Rows {
@@ -21,12 +25,34 @@ struct Rows {
 }
 
 impl Rows {
-    fn new(lists: Vec<Vec<(u32, f32)>>) -> Self {
-        let mut start = vec![0];
-        for list in &lists {
-            start.push(start[start.len() - 1] + list.len());
+    /// Values of all kernels at `probes`.
+    fn of(cloud: &Cloud, probes: &[Probe]) -> Self {
+        let mut rows = Self { start: vec![0], entries: Vec::new() };
+        for probe in probes {
+            let from = rows.entries.len();
+            cloud.for_each_near_point(probe.position, |i| {
+                let v =
+                    kernel::value(cloud.sharpness[i], (cloud.centre[i] - probe.position).length_squared());
+                if v > 0.0 {
+                    rows.entries.push((i as u32, v));
+                }
+            });
+            rows.entries[from..].sort_unstable_by_key(|(i, _)| *i);
+            rows.start.push(rows.entries.len());
         }
-        Self { start, entries: lists.concat() }
+        rows
+    }
+
+    /// One below the other; every part is freed as soon as it is copied.
+    fn joined(parts: Vec<Self>) -> Self {
+        let total = parts.iter().map(|p| p.entries.len()).sum();
+        let mut all = Self { start: vec![0], entries: Vec::with_capacity(total) };
+        for part in parts {
+            let from = all.entries.len();
+            all.start.extend(part.start[1..].iter().map(|s| from + s));
+            all.entries.extend(part.entries);
+        }
+        all
     }
 
     fn row(&self, i: usize) -> &[(u32, f32)] {
@@ -65,38 +91,27 @@ impl Rows {
     }
 }
 
+/// The weights of `samples`, whose positions count from `middle` where those of `probes` do.
 pub(crate) fn weights(
     samples: &[Candidate],
-    probes: &[Candidate],
+    middle: DVec3,
+    probes: &[Probe],
     width_factor: f32,
     stage: Stage<'_>,
 ) -> Result<Vec<f32>> {
     stage.announce(ITERATIONS);
-    let origin = samples.first().map_or(glam::DVec3::ZERO, |s| s.position);
-    let local = |p: glam::DVec3| (p - origin).as_vec3();
-    let centre: Vec<Vec3> = samples.iter().map(|s| local(s.position)).collect();
+    let centre: Vec<Vec3> = samples.iter().map(|s| (s.position - middle).as_vec3()).collect();
     let sharpness: Vec<f32> =
         samples.iter().map(|s| kernel::sharpness(s.radius as f32, width_factor)).collect();
     let n = centre.len();
     let cloud = Cloud::from_parts(centre, sharpness, vec![1.0; n]);
     // Each row of the system is a probe, scaled by the fourth root of its fluence (√Φ in the squared error).
-    let lists: Vec<Vec<(u32, f32)>> = probes
-        .par_iter()
-        .map(|probe| {
-            let p = local(probe.position);
-            let mut row = Vec::new();
-            cloud.for_each_near_point(p, |i| {
-                let v = kernel::value(cloud.sharpness[i], (cloud.centre[i] - p).length_squared());
-                if v > 0.0 {
-                    row.push((i as u32, v));
-                }
-            });
-            row.sort_unstable_by_key(|(i, _)| *i);
-            row
-        })
-        .collect();
-    let importance: Vec<f32> = probes.iter().map(|p| p.fluence.max(1e-6).sqrt() as f32).collect();
-    let by_probe = Rows::new(lists);
+    let parts: Vec<Rows> = probes
+        .par_chunks(PART)
+        .map(|probes| stage.step(0).map(|()| Rows::of(&cloud, probes)))
+        .collect::<Result<_>>()?;
+    let by_probe = Rows::joined(parts);
+    let importance: Vec<f32> = probes.iter().map(|p| p.fluence.max(1e-6).sqrt()).collect();
     let by_sample = by_probe.transposed(n);
     let wanted = by_sample.times(&importance);
     let mut w = vec![1.0f32; n];

@@ -91,8 +91,13 @@ mod tests {
     fn a_ball_has_the_area_of_a_ball() {
         let n = 40;
         let cell = 2.4 / (n - 1) as f64;
-        let mut grid =
-            DistanceGrid { size: [n; 3], origin: DVec3::splat(-1.2), cell, depth: vec![0.0; n * n * n] };
+        let mut grid = DistanceGrid {
+            size: [n; 3],
+            origin: DVec3::splat(-1.2),
+            cell,
+            depth: vec![0.0; n * n * n],
+            skipped: 0,
+        };
         for i in 0..n * n * n {
             grid.depth[i] = (1.0 - grid.node(i).length()) as f32;
         }

@@ -6,7 +6,7 @@
 mod isosurface;
 
 use crate::Result;
-use crate::field::Shape;
+use crate::field::{DistanceGrid, Shape};
 use crate::params::Placement;
 use crate::progress::Stage;
 use diaphane_formats::medium::Medium;
@@ -32,16 +32,17 @@ const THESIS_OFFSET: f64 = 0.5;
 
 pub(crate) fn build(
     shape: &Shape<'_>,
+    grid: &DistanceGrid,
     medium: &Medium,
     placement: Placement,
     stage: Stage<'_>,
 ) -> Result<Vec<Layer>> {
-    let deepest = shape.grid.depth.iter().copied().fold(0.0, f32::max) as f64;
+    let deepest = grid.depth.iter().copied().fold(0.0, f32::max) as f64;
     // Slabs no thicker than the samples' spacing or half a mean free path near the surface.
     let kappa = medium.reference_extinction().max(1e-9 / shape.diagonal);
     let first = (0.7 * shape.spacing).min(0.5 / kappa).max(shape.spacing * 0.2).max(deepest / 40.0);
     let (mut offsets, mut step, growth) = match placement {
-        Placement::Boundary => (vec![0.02 * shape.spacing.min(shape.grid.cell)], first, GROWTH),
+        Placement::Boundary => (vec![0.02 * shape.spacing.min(grid.cell)], first, GROWTH),
         Placement::Layers => (vec![THESIS_OFFSET * shape.spacing], THESIS_OFFSET * shape.spacing, 1.0),
     };
     while let Some(next) = offsets.last().map(|o| o + step).filter(|n| *n < deepest) {
@@ -54,7 +55,7 @@ pub(crate) fn build(
         .enumerate()
         .map(|(i, &offset)| {
             let next = offsets.get(i + 1).copied().unwrap_or(deepest.max(offset + step));
-            let mut layer = isosurface::extract(&shape.grid, offset as f32);
+            let mut layer = isosurface::extract(grid, offset as f32);
             layer.offset = offset;
             layer.thickness = next - offset;
             stage.step(1)?;

@@ -81,7 +81,7 @@ impl<'a> Player<'a> {
         Self { asset, cloud, stencil, rays }
     }
 
-    /// Radiance of every ray, phase function left out, for each of `lights` lights, light l in channel l % 3 alone;
+    /// Radiance of every ray, albedo and phase function left out, for each of `lights` lights, light l in channel l % 3 alone;
     /// `arriving` gives ψβ of a light at a sample for that channel, `means` its share of the correction for means
     /// ([`diaphane_formats::slopes`]).
     pub fn radiance(
@@ -91,14 +91,13 @@ impl<'a> Player<'a> {
         means: Vec3,
         stage: Stage<'_>,
     ) -> Result<Vec<Vec<f32>>> {
-        let albedo = DVec3::from(self.asset.info.albedo).as_vec3();
         let mut out = Vec::with_capacity(lights);
         for first in (0..lights).step_by(3) {
             let channels = (lights - first).min(3);
             let value = |i: usize| {
                 let mut v = Vec3::ZERO;
                 for c in 0..channels {
-                    v[c] = albedo[c] * arriving(i, first + c);
+                    v[c] = arriving(i, first + c);
                 }
                 v
             };

@@ -2,10 +2,10 @@
 //!
 //! Over an inside piece of density length M, counted in m from its start, channel c and a light of unit irradiance
 //!
-//!   L = B Ω κ_c ∫_0^M e^{-κ_c (m_0 + m)} σ(m) ψ_c β dm
+//!   L = B κ_c ∫_0^M e^{-κ_c (m_0 + m)} σ(m) ψ_c β dm
 //!
 //! with B the boundary's part of the view ray, m_0 the density length of the pieces before, σ the part of
-//! the density that scatters; the phase function is a factor of view and light that is left out here. Points are stratified: some
+//! the density that scatters; albedo and phase function are factors that are left out here. Points are stratified: some
 //! strata are even in m, some dense at the start, some at the end, so that light from any side is resolved. Two
 //! independent sets of random points give two estimates R and R'; both are unbiased, so (I - R)(I - R') is unbiased for the
 //! squared error and R R' for the squared radiance: the quadrature's own noise cancels from both.
@@ -33,7 +33,7 @@ struct Node {
     position: DVec3,
     /// Ray, counted over all views, and which of the two estimates.
     estimate: usize,
-    /// What one unit of ψβ there adds to the radiance, per channel, phase function left out.
+    /// What one unit of ψβ there adds to the radiance, per channel, albedo and phase function left out.
     weight: Vec3,
 }
 
@@ -172,7 +172,7 @@ impl Walk<'_> {
                             continue;
                         }
                         let attenuation = (-medium.extinction() * (self.before + m)).exp();
-                        let emitted = medium.extinction() * medium.albedo() * (scattering / rho);
+                        let emitted = medium.extinction() * (scattering / rho);
                         let width = 0.5 * (ends[1] - ends[0]) / kappa;
                         let weight = (attenuation * emitted * width * self.boundary).as_vec3();
                         out.push(Node { position, estimate: 2 * ray + estimate, weight });

@@ -70,11 +70,14 @@ impl Trial {
         let near = nearest(bench.shape, &placed.samples, f64::from(CELL_RADIUS));
         let buried = buried(&placed.samples, &near);
         let cells = Cells::new(bench.shape, medium, &placed.samples, &buried, POINTS, seed)?;
-        let weight = weights(&placed.samples, &placed.probes, width_factor, stage)?;
+        let (low, high) = bench.shape.mesh.bounds();
+        let middle = 0.5 * (low + high);
+        let weight = weights(&placed.samples, middle, &placed.probes, width_factor, stage)?;
         let params = &crate::params::Params { width_factor, ..bench.params.clone() };
-        let stand = Stand { samples: &placed.samples, cells: &cells, discarded: 0 };
+        let offset = cells.offsets(&placed.samples);
+        let stand = Stand { samples: &placed.samples, offset, discarded: 0 };
         let light = Light::none(placed.samples.len(), boundary_order(medium.ior(), params.order));
-        let asset = pack(bench.input, bench.medium.sampled.as_ref(), params, &stand, light, weight)?;
+        let asset = pack(bench.input, bench.medium.sampled.as_ref(), params, stand, light, weight)?;
         let player = Player::new(&asset, &self.views);
         stage.announce(2 * LIGHTS);
         let lights: Vec<(DVec3, usize)> = self.lights.iter().enumerate().map(|(l, d)| (*d, l % 3)).collect();

@@ -1,14 +1,16 @@
 //! Candidates on the layers and in the slabs beneath them.
 
-use super::Candidate;
+use super::{Candidate, Ground};
 use crate::density::LayerFluence;
 use crate::field::{Shape, inside_nodes};
 use crate::layers::Layer;
 use crate::params::{BOUNDARY_SNAP, DARK, Params, Placement, RADIUS_EXPONENT};
+use crate::progress::Stage;
 use crate::{Error, Result};
 use diaphane_formats::directions::hash;
 use diaphane_formats::medium::Medium;
 use glam::DVec3;
+use rand::seq::SliceRandom;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use rayon::prelude::*;
@@ -19,6 +21,8 @@ const OVERSAMPLING: usize = 16;
 const SURFACE_CANDIDATES: f64 = 12.0;
 /// Usable candidates for each wanted sample that end the drawing.
 const ENOUGH: usize = 10;
+/// Candidates that are drawn and tested together: bounds the memory of the tests.
+const TOGETHER: usize = 1 << 18;
 /// Draws at the most.
 const ROUNDS: u64 = 8;
 
@@ -43,11 +47,12 @@ struct Patch {
 
 pub(crate) fn offer(
     shape: &Shape<'_>,
-    layers: &[Layer],
-    fluence: &LayerFluence,
+    ground: &Ground,
     medium: &Medium,
     params: &Params,
+    stage: Stage<'_>,
 ) -> Result<Offered> {
+    let Ground { layers, fluence, .. } = ground;
     let patches = patches(layers, fluence, medium);
     let mean = reference_demand(&patches);
     let relative_radius = |demand: f64| (demand / mean).max(1e-12).powf(-RADIUS_EXPONENT).clamp(0.5, 2.0);
@@ -92,35 +97,35 @@ pub(crate) fn offer(
     let mut dark = 0;
     for round in 0..ROUNDS {
         let seed = hash(hash(params.seed, 23), round);
-        let drawn: Vec<Candidate> = (0..wanted).into_par_iter().map(|i| one(seed, i)).collect();
-        let kept = usable(shape, medium, &drawn)?;
-        dark += drawn.len() - kept.len();
-        list.extend(kept);
+        for from in (0..wanted).step_by(TOGETHER) {
+            stage.step(0)?;
+            let some = from..wanted.min(from + TOGETHER);
+            let drawn: Vec<Candidate> = some.into_par_iter().map(|i| one(seed, i)).collect();
+            let kept = usable(shape, medium, &drawn)?;
+            dark += drawn.len() - kept.len();
+            list.extend(kept);
+        }
         if list.len() >= ENOUGH * params.samples {
             break;
         }
     }
-    let mut order: Vec<(u64, Candidate)> =
-        list.iter().enumerate().map(|(i, c)| (hash(hash(params.seed, 29), i as u64), *c)).collect();
-    order.sort_unstable_by_key(|(key, _)| *key);
+    list.shuffle(&mut Pcg64Mcg::seed_from_u64(hash(params.seed, 29)));
     if list.is_empty() {
         return Err(no_room());
     }
-    let list: Vec<Candidate> = order.into_iter().map(|(_, c)| c).collect();
     if on_layers {
         return Ok(Offered { surface: Vec::new(), list, snap: 0.0, dark });
     }
-    let fill = usable(shape, medium, &fill(shape, &list, layers))?;
-    let surface =
-        usable(shape, medium, &surface(shape, layers, fluence, medium, &relative_radius, params.seed))?;
-    Ok(Offered { surface, list: list.into_iter().chain(fill).collect(), snap: BOUNDARY_SNAP, dark })
+    let fill = usable(shape, medium, &fill(ground, &list))?;
+    let surface = usable(shape, medium, &surface(shape, ground, medium, &relative_radius, params.seed))?;
+    list.extend(fill);
+    Ok(Offered { surface, list, snap: BOUNDARY_SNAP, dark })
 }
 
 /// Candidates on the boundary: on the first layer in proportion to 1/radius², moved onto the mesh.
 fn surface(
     shape: &Shape<'_>,
-    layers: &[Layer],
-    fluence: &LayerFluence,
+    Ground { grid, layers, fluence }: &Ground,
     medium: &Medium,
     relative_radius: &(impl Fn(f64) -> f64 + Sync),
     seed: u64,
@@ -148,7 +153,7 @@ fn surface(
             let corners = &layer.triangles[t];
             let bary = barycentric(rng.random(), rng.random());
             let p: DVec3 = bary.iter().zip(corners).map(|(b, v)| layer.positions[*v as usize] * *b).sum();
-            let nearest = shape.accel.nearest(p, 2.0 * shape.grid.cell)?;
+            let nearest = shape.accel.nearest(p, 2.0 * grid.cell)?;
             let inward = (p - nearest.point).try_normalize().unwrap_or(-shape.accel.normal(nearest.triangle));
             let position = nearest.point + inward * (1e-5 * shape.diagonal);
             let fluence = light(corners, bary);
@@ -199,12 +204,11 @@ fn barycentric(u: f64, v: f64) -> [f64; 3] {
 
 /// Nodes of the distance grid that lie inside, with the radius and light of the nearest slab's mean: offered last, so
 /// that they only close holes which the layers left.
-fn fill(shape: &Shape<'_>, drawn: &[Candidate], layers: &[Layer]) -> Vec<Candidate> {
+fn fill(Ground { grid, layers, .. }: &Ground, drawn: &[Candidate]) -> Vec<Candidate> {
     if layers.is_empty() {
         return Vec::new();
     }
     // Mean radius and light by depth, in bins of one grid cell.
-    let grid = &shape.grid;
     let bin = |depth: f64| (depth / grid.cell).max(0.0) as usize;
     let deepest = grid.depth.iter().copied().fold(0.0, f32::max);
     let mut sums = vec![(0.0, 0.0, 0.0); bin(f64::from(deepest)) + 2];

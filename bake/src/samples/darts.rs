@@ -9,14 +9,14 @@ use glam::DVec3;
 /// Finds the scale of the radii at which about `wanted` darts are kept, and keeps them.
 pub(super) fn throw_to_count(
     shape: &Shape<'_>,
-    candidates: &[Candidate],
+    candidates: impl Iterator<Item = Candidate> + Clone,
     wanted: usize,
     stage: &Stage<'_>,
 ) -> Result<Vec<Candidate>> {
     let mut scale = 0.9 * shape.spacing;
     let mut best: Option<Vec<Candidate>> = None;
     for _ in 0..8 {
-        let kept = throw(shape, candidates, scale);
+        let kept = throw(shape, candidates.clone(), scale, stage)?;
         stage.step(1)?;
         let count = kept.len();
         let error = |n: usize| (n as f64 / wanted as f64).ln().abs();
@@ -44,6 +44,9 @@ struct Cells {
 }
 
 const NONE: u32 = u32::MAX;
+
+/// Darts between two looks at whether the bake should stop.
+const LOOK_UP: usize = 1 << 16;
 
 impl Cells {
     fn new(shape: &Shape<'_>, cell: f64) -> Self {
@@ -78,12 +81,20 @@ impl Cells {
 }
 
 /// Two samples keep the mean of their radii apart.
-fn throw(shape: &Shape<'_>, candidates: &[Candidate], scale: f64) -> Vec<Candidate> {
+fn throw(
+    shape: &Shape<'_>,
+    candidates: impl Iterator<Item = Candidate>,
+    scale: f64,
+    stage: &Stage<'_>,
+) -> Result<Vec<Candidate>> {
     // Radii lie within 1/2..2 of the scale, so no disk reaches further than two cells of one scale.
     let mut cells = Cells::new(shape, scale.max(shape.diagonal / 400.0));
     let cell = 1.0 / cells.inverse;
     let mut kept: Vec<Candidate> = Vec::new();
-    for candidate in candidates {
+    for (i, candidate) in candidates.enumerate() {
+        if i % LOOK_UP == 0 {
+            stage.step(0)?;
+        }
         let radius = candidate.radius * scale;
         let home = cells.cell(candidate.position);
         let reach = 0.5 * (radius + 2.0 * scale);
@@ -110,8 +121,8 @@ fn throw(shape: &Shape<'_>, candidates: &[Candidate], scale: f64) -> Vec<Candida
             let index = cells.index(home);
             cells.next.push(cells.first[index]);
             cells.first[index] = kept.len() as u32;
-            kept.push(Candidate { radius, ..*candidate });
+            kept.push(Candidate { radius, ..candidate });
         }
     }
-    kept
+    Ok(kept)
 }

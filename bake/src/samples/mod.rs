@@ -12,14 +12,26 @@ mod darts;
 pub(crate) use candidates::{Offered, offer};
 
 use crate::Result;
-use crate::field::Shape;
+use crate::blocks;
+use crate::density::LayerFluence;
+use crate::field::{DistanceGrid, Shape};
+use crate::layers::Layer;
 use crate::progress::Stage;
 use diaphane_formats::asset::Places;
-use glam::DVec3;
+use diaphane_formats::morton;
+use glam::{DVec3, Vec3};
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+/// Where samples may stand, and how much light there is.
+pub(crate) struct Ground {
+    pub grid: DistanceGrid,
+    pub layers: Vec<Layer>,
+    pub fluence: LayerFluence,
+}
 
 /// A possible or chosen sample.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub(crate) struct Candidate {
     pub position: DVec3,
     /// Disk radius; before placing relative to the common scale, in 1/2..2.
@@ -28,11 +40,22 @@ pub(crate) struct Candidate {
     pub fluence: f64,
 }
 
+/// A point where the sum of kernels should be one.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+pub(crate) struct Probe {
+    /// Relative to the middle of the mesh's box.
+    pub position: Vec3,
+    /// Φ/4π.
+    pub fluence: f32,
+}
+
 /// Where the samples are.
+#[derive(Serialize, Deserialize)]
 pub(crate) struct Placed {
+    /// In the order of [`blocks::arrange`].
     pub samples: Vec<Candidate>,
     /// Random points with the samples' distribution, inside and on the boundary, for fitting weights.
-    pub probes: Vec<Candidate>,
+    pub probes: Vec<Probe>,
     /// Samples that were moved onto the boundary.
     pub snapped: usize,
     /// Candidates without light or scattering that were left out.
@@ -52,11 +75,20 @@ pub(crate) fn place(
 ) -> Result<Placed> {
     stage.announce(8);
     let scaled = |c: &Candidate| Candidate { radius: (c.radius * factor(c.position)).clamp(0.5, 2.0), ..*c };
-    let list: Vec<Candidate> = offered.surface.par_iter().chain(&offered.list).map(scaled).collect();
-    let mut samples = darts::throw_to_count(shape, &list, wanted, &stage)?;
+    let list = offered.surface.iter().chain(&offered.list).map(scaled);
+    let mut samples = darts::throw_to_count(shape, list, wanted, &stage)?;
     let snapped = snap_to_boundary(shape, offered.snap, &mut samples);
+    let (low, high) = shape.mesh.bounds();
+    let samples = blocks::arrange(samples, low, high);
     let inside = offered.list.iter().take(PROBES_PER_SAMPLE * samples.len());
-    let probes = inside.chain(offered.surface.iter().step_by(2)).copied().collect();
+    let probes: Vec<&Candidate> = inside.chain(offered.surface.iter().step_by(2)).collect();
+    let middle = 0.5 * (low + high);
+    let probe = |i: u32| {
+        let c = probes[i as usize];
+        Probe { position: (c.position - middle).as_vec3(), fluence: c.fluence as f32 }
+    };
+    let order = morton::order(probes.iter().map(|c| c.position), low, high);
+    let probes = order.into_iter().map(probe).collect();
     Ok(Placed { samples, probes, snapped, dark: offered.dark })
 }
 

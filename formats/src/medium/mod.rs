@@ -86,6 +86,29 @@ impl Medium {
         &self.density
     }
 
+    /// A hash (BLAKE3) of all that decides how light fades: everything but albedo and phase function.
+    pub fn optical_hash(&self) -> [u8; 32] {
+        let mut hasher = blake3::Hasher::new();
+        let mut text = |part: &dyn std::fmt::Debug| _ = hasher.update(format!("{part:?};").as_bytes());
+        text(&(self.extinction, self.ior));
+        match &self.density {
+            Density::Grid(grid) => {
+                text(&(grid.size(), grid.bounds()));
+                hasher.update(bytemuck::cast_slice(grid.values()));
+            }
+            Density::Shapes(shapes) => {
+                text(&(shapes.base, &shapes.shapes));
+                for shape in &shapes.shapes {
+                    if let Solid::Mesh(mesh) = &shape.solid {
+                        hasher.update(&mesh.0.content_hash());
+                    }
+                }
+            }
+            plain => text(plain),
+        }
+        *hasher.finalize().as_bytes()
+    }
+
     /// Mean of the channels' extinction: the reference for optical depths that stand for all channels.
     pub fn reference_extinction(&self) -> f64 {
         self.extinction.element_sum() / 3.0

@@ -48,6 +48,16 @@ impl Mesh {
         Ok(Self { positions, triangles })
     }
 
+    /// A hash (BLAKE3) of all vertices and triangles.
+    pub fn content_hash(&self) -> [u8; 32] {
+        let mut hasher = blake3::Hasher::new();
+        for p in &self.positions {
+            p.to_array().iter().for_each(|c| _ = hasher.update(&c.to_le_bytes()));
+        }
+        hasher.update(bytemuck::cast_slice(&self.triangles));
+        *hasher.finalize().as_bytes()
+    }
+
     /// The corners of triangle `i`.
     pub fn corners(&self, i: usize) -> [DVec3; 3] {
         self.triangles[i].map(|v| self.positions[v as usize])

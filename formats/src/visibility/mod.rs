@@ -13,7 +13,7 @@ pub use rays::{Depth, InsidePiece, depth_along, inside_pieces};
 pub use trace::trace;
 
 /// Depths of all points along one direction.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct DepthRows {
     /// m of each point along ω.
     pub forward: Vec<f32>,
@@ -29,5 +29,13 @@ impl DepthRows {
     /// m of each point along ω (side 0) or -ω (side 1).
     pub fn lengths(&self, side: usize) -> &[f32] {
         if side == 0 { &self.forward } else { &self.backward }
+    }
+
+    /// Adds the depths of more points.
+    fn append(&mut self, more: Self) {
+        self.forward.extend(more.forward);
+        self.backward.extend(more.backward);
+        self.boundary.iter_mut().zip(more.boundary).for_each(|(own, more)| own.extend(more));
+        self.winding.iter_mut().zip(more.winding).for_each(|(own, more)| own.extend(more));
     }
 }

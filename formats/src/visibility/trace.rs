@@ -15,7 +15,8 @@ pub fn trace(
     points: &[DVec3],
     direction: DVec3,
 ) -> DepthRows {
-    let along = Along::new(medium, sampled, points, direction);
+    let running = sampled.map(|s| s.running(direction));
+    let along = Along::new(medium, running.as_ref(), points, direction);
     let n = points.len();
     let matched = medium.ior() == 1.0;
     let ones = || vec![1.0f32; if matched { 0 } else { n }];

@@ -79,6 +79,7 @@ pub fn agreement(
     points: &[DVec3],
     directions: usize,
 ) -> Agreement {
+    let diagonal = mesh.diagonal();
     let one = |axis: &DVec3| {
         let (a, b) = (project(mesh, medium, points, *axis), trace(accel, medium, None, points, *axis));
         let mut out = Agreement { lines: points.len() as u64, ..Agreement::default() };
@@ -87,7 +88,7 @@ pub fn agreement(
             out.wrong_projected += wrong(&a);
             out.wrong_traced += wrong(&b);
             for (a, b) in a.lengths(side).iter().zip(b.lengths(side)) {
-                out.largest = out.largest.max(f64::from((a - b).abs()) / mesh.diagonal());
+                out.largest = out.largest.max(f64::from((a - b).abs()) / diagonal);
             }
         }
         out

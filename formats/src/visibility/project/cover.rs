@@ -10,16 +10,15 @@ use std::ops::Range;
 pub(super) const PADDING: usize = 7;
 
 /// A projected triangle: edge functions in the order of the vertex indices, and its plane.
-struct Projected<S: Simd> {
-    /// Start point and direction of each edge in canonical order.
-    start: [[S::f64s; 2]; 3],
-    along: [[S::f64s; 2]; 3],
-    /// 1 where the triangle runs along the edge's canonical direction, else -1.
-    turn: [S::f64s; 3],
-    /// Least value of the turned edge function that counts as left of the edge. Of the two triangles at an edge one has
+struct Projected {
+    /// Start point of each edge in canonical order, and its direction, turned round where the triangle runs against it:
+    /// every product and difference changes its sign with that and nothing else.
+    start: [[f64; 2]; 3],
+    along: [[f64; 2]; 3],
+    /// Least value of the edge function that counts as left of the edge. Of the two triangles at an edge one has
     /// 0, the other the least positive number: exactly one of them owns the edge.
-    least: [S::f64s; 3],
-    z: [S::f64s; 3],
+    least: [f64; 3],
+    z: [f64; 3],
 }
 
 /// What a triangle is to some points.
@@ -30,52 +29,50 @@ pub(super) struct Cover<S: Simd> {
     pub z: S::f64s,
 }
 
-impl<S: Simd> Projected<S> {
+impl Projected {
     #[inline(always)]
-    fn new(simd: S, p: &[[f64; 3]; 3], indices: [u32; 3]) -> Self {
-        let all = |x: f64| simd.splat_f64s(x);
-        let edge = |k: usize| {
+    fn new(p: &[[f64; 3]; 3], indices: [u32; 3]) -> Self {
+        let mut out = Self { start: [[0.0; 2]; 3], along: [[0.0; 2]; 3], least: [0.0; 3], z: [0.0; 3] };
+        for k in 0..3 {
             let (i, j) = (k, (k + 1) % 3);
             let along = indices[i] < indices[j];
             let (a, b) = if along { (p[i], p[j]) } else { (p[j], p[i]) };
-            (along, [a[0], a[1]], [b[0] - a[0], b[1] - a[1]])
-        };
-        let edges = [edge(0), edge(1), edge(2)];
-        Self {
-            start: edges.map(|e| e.1.map(all)),
-            along: edges.map(|e| e.2.map(all)),
-            turn: edges.map(|e| all(if e.0 { 1.0 } else { -1.0 })),
-            least: edges.map(|e| all(if e.0 { 0.0 } else { f64::from_bits(1) })),
-            z: p.map(|c| all(c[2])),
+            let turn = if along { 1.0 } else { -1.0 };
+            out.start[k] = [a[0], a[1]];
+            out.along[k] = [turn * (b[0] - a[0]), turn * (b[1] - a[1])];
+            out.least[k] = if along { 0.0 } else { f64::from_bits(1) };
+            out.z[k] = p[k][2];
         }
+        out
     }
 
     /// `None` if it covers none of them.
     #[inline(always)]
-    fn cover(&self, simd: S, u: S::f64s, v: S::f64s) -> Option<Cover<S>> {
+    fn cover<S: Simd>(&self, simd: S, u: S::f64s, v: S::f64s) -> Option<Cover<S>> {
+        let all = |x: f64| simd.splat_f64s(x);
         let edge = |k: usize| {
             let ([a, b], [x, y]) = (self.start[k], self.along[k]);
-            let value =
-                simd.sub_f64s(simd.mul_f64s(x, simd.sub_f64s(v, b)), simd.mul_f64s(y, simd.sub_f64s(u, a)));
-            simd.mul_f64s(value, self.turn[k])
+            let (du, dv) = (simd.sub_f64s(u, all(a)), simd.sub_f64s(v, all(b)));
+            simd.sub_f64s(simd.mul_f64s(all(x), dv), simd.mul_f64s(all(y), du))
         };
         let e = [edge(0), edge(1), edge(2)];
-        let left = [0, 1, 2].map(|k| simd.greater_than_or_equal_f64s(e[k], self.least[k]));
-        let all = simd.and_m64s(simd.and_m64s(left[0], left[1]), left[2]);
+        let is_left = |k: usize| simd.greater_than_or_equal_f64s(e[k], all(self.least[k]));
+        let left = [is_left(0), is_left(1), is_left(2)];
+        let every = simd.and_m64s(simd.and_m64s(left[0], left[1]), left[2]);
         let some = simd.or_m64s(simd.or_m64s(left[0], left[1]), left[2]);
         let sum = simd.add_f64s(simd.add_f64s(e[0], e[1]), e[2]);
-        let zero = simd.splat_f64s(0.0);
+        let zero = all(0.0);
         // Seen from the side it covers nothing.
         let flat = simd.equal_f64s(sum, zero);
-        let covered = simd.and_m64s(simd.or_m64s(all, simd.not_m64s(some)), simd.not_m64s(flat));
+        let covered = simd.and_m64s(simd.or_m64s(every, simd.not_m64s(some)), simd.not_m64s(flat));
         if simd.first_true_m64s(covered) == S::F64_LANES {
             return None;
         }
         let heights = simd.add_f64s(
-            simd.add_f64s(simd.mul_f64s(e[1], self.z[0]), simd.mul_f64s(e[2], self.z[1])),
-            simd.mul_f64s(e[0], self.z[2]),
+            simd.add_f64s(simd.mul_f64s(e[1], all(self.z[0])), simd.mul_f64s(e[2], all(self.z[1]))),
+            simd.mul_f64s(e[0], all(self.z[2])),
         );
-        let facing = simd.select_f64s(all, simd.splat_f64s(1.0), simd.splat_f64s(-1.0));
+        let facing = simd.select_f64s(every, all(1.0), all(-1.0));
         Some(Cover { sign: simd.select_f64s(covered, facing, zero), z: simd.div_f64s(heights, sum) })
     }
 }
@@ -105,7 +102,7 @@ impl<V: Visit> WithSimd for Crossings<'_, V> {
             let low = [0, 1].map(|k| p[0][k].min(p[1][k]).min(p[2][k]));
             let high = [0, 1].map(|k| p[0][k].max(p[1][k]).max(p[2][k]));
             let Some(rows) = self.buckets.rows(low, high) else { continue };
-            let triangle = Projected::new(simd, &p, *indices);
+            let triangle = Projected::new(&p, *indices);
             for range in rows {
                 let mut from = range.start;
                 while from < range.end {

@@ -13,7 +13,7 @@ mod cover;
 use super::DepthRows;
 use super::along::Along;
 use crate::fresnel;
-use crate::medium::{Medium, SampledDensity};
+use crate::medium::{Medium, RunningIntegral, SampledDensity};
 use crate::mesh::Mesh;
 use buckets::Buckets;
 use cover::{Cover, Crossings, PADDING, Visit, add_to, lanes, load};
@@ -37,43 +37,80 @@ pub fn project_with(
 ) -> DepthRows {
     let (u_axis, v_axis) = direction.any_orthonormal_pair();
     let frame = [u_axis, v_axis, direction];
-    let buckets = &Buckets::new(points, &frame);
-    let corners: &[[f64; 3]] =
-        &mesh.positions.iter().map(|p| frame.map(|axis| p.dot(axis))).collect::<Vec<_>>();
-    let (arch, triangles) = (Arch::new(), &mesh.triangles[..]);
-    let padded = points.len() + PADDING;
-    let mut sums = Sums {
-        depth: [vec![0.0; padded], vec![0.0; padded]],
-        winding: [vec![0.0; padded], vec![0.0; padded]],
-    };
-    let matched = medium.ior() == 1.0;
-    let (mut boundary, mut scale) = ([vec![], vec![]], 1.0);
-    if medium.is_homogeneous() && matched {
-        let mut visit = Even { z: &buckets.z, sums };
-        arch.dispatch(Crossings { corners, triangles, buckets, visit: &mut visit });
-        (sums, scale) = (visit.sums, medium.uniform_density());
-    } else {
-        let along = Along::new(medium, sampled, points, direction);
-        let ones = || vec![1.0; if matched { 0 } else { points.len() }];
-        let mut visit =
-            Any { along, mesh, buckets, sums, boundary: [ones(), ones()], through: (usize::MAX, 1.0) };
-        arch.dispatch(Crossings { corners, triangles, buckets, visit: &mut visit });
-        (sums, boundary) = (visit.sums, visit.boundary);
-    }
-    let length = |m: f64| (m * scale).max(0.0) as f32;
-    let [forward, backward] = sums.depth.map(|values| buckets.unsorted(&values, length));
-    DepthRows {
-        forward,
-        backward,
-        boundary: boundary.map(|values| if matched { values } else { buckets.unsorted(&values, |t| t) }),
-        winding: sums.winding.map(|values| buckets.unsorted(&values, |w| w as i8)),
+    let corners: Vec<[f64; 3]> = mesh.positions.iter().map(|p| frame.map(|axis| p.dot(axis))).collect();
+    let running = sampled.map(|s| s.running(direction));
+    let projected = Projected { mesh, medium, frame, corners, running: running.as_ref() };
+    let mut blocks = points.chunks(BLOCK.max(mesh.triangles.len() / TRIANGLES_PER_POINT));
+    let mut rows = blocks.next().map(|block| projected.depths(block)).unwrap_or_default();
+    blocks.for_each(|block| rows.append(projected.depths(block)));
+    rows
+}
+
+/// Points that are projected together: few enough that the triangles find them in the cache (measured on 30,000
+/// triangles: 24 M rays/s with 100,000 to 300,000 points, 22 with 500,000, 15 with a million).
+const BLOCK: usize = 1 << 18;
+/// Blocks of large meshes are larger, so that going through all triangles again costs little.
+const TRIANGLES_PER_POINT: usize = 4;
+
+/// A mesh along one direction.
+struct Projected<'a> {
+    mesh: &'a Mesh,
+    medium: &'a Medium,
+    /// Across the direction twice, along it.
+    frame: [DVec3; 3],
+    /// The vertices in it.
+    corners: Vec<[f64; 3]>,
+    running: Option<&'a RunningIntegral>,
+}
+
+impl Projected<'_> {
+    fn depths(&self, points: &[DVec3]) -> DepthRows {
+        let (mesh, medium) = (self.mesh, self.medium);
+        let buckets = &Buckets::new(points, &self.frame);
+        let corners = &self.corners[..];
+        let (arch, triangles) = (Arch::new(), &mesh.triangles[..]);
+        let padded = points.len() + PADDING;
+        let mut sums = Sums { depth: [vec![0.0; padded], vec![0.0; padded]], windings: vec![0.0; padded] };
+        let matched = medium.ior() == 1.0;
+        let (mut boundary, mut scale) = ([vec![], vec![]], 1.0);
+        if medium.is_homogeneous() && matched {
+            let mut visit = Even { z: &buckets.z, sums };
+            arch.dispatch(Crossings { corners, triangles, buckets, visit: &mut visit });
+            (sums, scale) = (visit.sums, medium.uniform_density());
+        } else {
+            let along = Along::new(medium, self.running, points, self.frame[2]);
+            let ones = || vec![1.0; if matched { 0 } else { points.len() }];
+            let mut visit =
+                Any { along, mesh, buckets, sums, boundary: [ones(), ones()], through: (usize::MAX, 1.0) };
+            arch.dispatch(Crossings { corners, triangles, buckets, visit: &mut visit });
+            (sums, boundary) = (visit.sums, visit.boundary);
+        }
+        let length = |m: f64| (m * scale).max(0.0) as f32;
+        let [forward, backward] = sums.depth.map(|values| buckets.unsorted(&values, length));
+        DepthRows {
+            forward,
+            backward,
+            boundary: boundary.map(|values| if matched { values } else { buckets.unsorted(&values, |t| t) }),
+            winding: [0, 1].map(|side| buckets.unsorted(&sums.windings, |w| windings(w)[side])),
+        }
     }
 }
 
 /// Sums of sorted points along ω and -ω, padded as the points are.
 struct Sums {
     depth: [Vec<f64>; 2],
-    winding: [Vec<f64>; 2],
+    /// Both winding numbers in one: that along ω plus [`BACK`] times that along -ω.
+    windings: Vec<f64>,
+}
+
+/// More than twice as much as any winding number.
+const BACK: i64 = 65536;
+
+/// Winding numbers along ω and along -ω.
+fn windings(both: f64) -> [i8; 2] {
+    let both = both as i64;
+    let back = (both + BACK / 2).div_euclid(BACK);
+    [(both - back * BACK) as i8, back as i8]
 }
 
 /// Where the medium is homogeneous and the boundary index matched: lengths alone, all lanes at once. Lanes that are not
@@ -96,12 +133,11 @@ impl Visit for Even<'_> {
         let behind = simd.less_than_f64s(distance, zero);
         let pick = |front: S::f64s, back: S::f64s| simd.select_f64s(behind, back, front);
         let at = range.start;
-        let Sums { depth, winding } = &mut self.sums;
+        let Sums { depth, windings } = &mut self.sums;
         add_to(simd, &mut depth[0], at, pick(length, zero));
         add_to(simd, &mut depth[1], at, pick(zero, length));
         // Seen along -ω both the distance and the sign of the crossing turn round.
-        add_to(simd, &mut winding[0], at, pick(sign, zero));
-        add_to(simd, &mut winding[1], at, pick(zero, simd.neg_f64s(sign)));
+        add_to(simd, windings, at, pick(sign, simd.mul_f64s(simd.splat_f64s(-BACK as f64), sign)));
     }
 }
 
@@ -135,7 +171,7 @@ impl Any<'_> {
         let distance = z - self.buckets.z[k];
         // As in `Even`.
         let side = usize::from(distance < 0.0);
-        self.sums.winding[side][k] += if side == 0 { sign } else { -sign };
+        self.sums.windings[k] += if side == 0 { sign } else { -BACK as f64 * sign };
         self.sums.depth[side][k] += sign * self.along.integral(self.buckets.order[k] as usize, distance);
         if !self.boundary[side].is_empty() {
             if self.through.0 != triangle {

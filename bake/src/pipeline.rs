@@ -1,0 +1,231 @@
+//! The stages of one bake, each of whose results the cache may hold.
+//!
+//! ```text
+//! distance field ─ samples ─ optical depth, harmonics (block by block) ─ light ─ weights ─ packing ─ certificate
+//! ```
+
+use crate::cache::{Cache, Key};
+use crate::certificate::{self, Measured};
+use crate::field::{DistanceGrid, Shape, grid_cells};
+use crate::fit::{self, Fits, Light, Lit};
+use crate::pack::{self, Stand};
+use crate::params::Params;
+use crate::progress::Timed;
+use crate::refine::{self, Bench};
+use crate::report::{Facts, Refinement, Report};
+use crate::samples::{Candidate, Ground, Placed};
+use crate::{Error, Input, Prepared, Result, blocks, density, layers, samples};
+use diaphane_formats::asset::Asset;
+use serde::{Deserialize, Serialize};
+use std::cell::OnceCell;
+
+/// Where samples stand.
+#[derive(Serialize, Deserialize)]
+struct Placing {
+    placed: Placed,
+    /// Of the kernels, in disk radii.
+    width_factor: f32,
+    refined: Option<Refinement>,
+    layers: usize,
+    /// Nodes of the distance grid without a query.
+    skipped: usize,
+}
+
+/// What the samples carry.
+#[derive(Serialize, Deserialize)]
+struct Lighting {
+    /// Which samples stay; all that follows is of those alone.
+    keep: Vec<bool>,
+    light: Light,
+    offset: Vec<[i8; 4]>,
+    /// For each of [`certificate::exact_lights`]: what arrives at the samples.
+    exact: Vec<Vec<f32>>,
+    buried: usize,
+    dark: usize,
+}
+
+/// What every stage of a bake may use.
+pub(crate) struct Pipeline<'a> {
+    input: &'a Input<'a>,
+    params: &'a Params,
+    cache: &'a Cache,
+    timed: &'a Timed<'a>,
+    shape: OnceCell<Shape<'a>>,
+    medium: OnceCell<Prepared<'a>>,
+}
+
+/// Names of results.
+struct Keys {
+    placing: Key,
+    /// Optical depths of all blocks.
+    depths: Key,
+    lighting: Key,
+}
+
+impl Keys {
+    fn new(input: &Input<'_>, params: &Params) -> Self {
+        let p = params;
+        let object = (input.mesh.content_hash(), input.medium.optical_hash());
+        let density = p.directions.min(crate::params::DENSITY_DIRECTIONS);
+        let placing = (object, p.samples, p.seed, p.placement, p.visibility, density, p.width_factor);
+        // Refinement looks at the boundary's bands too.
+        let refined = (p.refine > 0).then_some((p.refine, p.order.min(6)));
+        let placing = Key::new("samples", &(placing, refined));
+        let depths = (&placing, p.directions, p.points_per_sample, p.visibility, p.certificate);
+        let depths = Key::new("optical depth", &depths);
+        let light = (&depths, p.order, p.extra_bands, p.light_error, p.representation);
+        Self { lighting: Key::new("light", &light), placing, depths }
+    }
+}
+
+impl<'a> Pipeline<'a> {
+    pub fn new(input: &'a Input<'a>, params: &'a Params, cache: &'a Cache, timed: &'a Timed<'a>) -> Self {
+        Self { input, params, cache, timed, shape: OnceCell::new(), medium: OnceCell::new() }
+    }
+
+    /// Runs what no cache holds.
+    pub fn run(&self) -> Result<(Asset, Report)> {
+        let keys = Keys::new(self.input, self.params);
+        let placing = self.cache.get(&keys.placing, || self.place())?;
+        let params = Params { width_factor: placing.width_factor, ..self.params.clone() };
+        let placed = &placing.placed;
+        let lighting = self.cache.get(&keys.lighting, || self.light(&keys, &placed.samples))?;
+        let samples: Vec<Candidate> = kept(&placed.samples, &lighting.keep);
+        let discarded = placed.samples.len() - samples.len();
+        let weights = Key::new("weights", &(&keys.depths, placing.width_factor));
+        let weights = self.cache.get(&weights, || {
+            let (low, high) = self.input.mesh.bounds();
+            let middle = 0.5 * (low + high);
+            self.timed
+                .stage("weights", |p| fit::weights(&samples, middle, &placed.probes, params.width_factor, p))
+        })?;
+        let Lighting { light, offset, exact, buried, dark, .. } = lighting;
+        let sampled = self.medium()?.sampled.as_ref();
+        let mut asset = self.timed.stage("packing", |_| {
+            let stand = Stand { samples: &samples, offset, discarded };
+            pack::pack(self.input, sampled, &params, stand, light, weights)
+        })?;
+        if params.certificate {
+            let key = Key::new("certificate", &(&keys.lighting, placing.width_factor));
+            let measured = self.cache.get(&key, || self.measure(&exact, &asset))?;
+            asset.info.certificate = Some(measured.certificate(self.input.medium));
+        }
+        let facts = Facts {
+            placed,
+            refinement: placing.refined.clone(),
+            layers: placing.layers,
+            skipped_queries: placing.skipped,
+            buried,
+            dark,
+            discarded,
+            visibility: self.method(placed.samples.len()),
+        };
+        let report = Report::new(&params, &facts, &asset, &self.timed.seconds.borrow(), self.cache.report());
+        Ok((asset, report))
+    }
+
+    fn shape(&self) -> Result<&Shape<'a>> {
+        if self.shape.get().is_none() {
+            let made = self.timed.stage("mesh", |_| Ok(Shape::new(self.input.mesh, self.params)))?;
+            return Ok(self.shape.get_or_init(|| made));
+        }
+        self.shape.get().ok_or_else(no_light)
+    }
+
+    fn medium(&self) -> Result<&Prepared<'a>> {
+        if self.medium.get().is_none() {
+            let made =
+                self.timed.stage("medium", |_| Ok(Prepared::new(self.input.medium, self.input.mesh)))?;
+            return Ok(self.medium.get_or_init(|| made));
+        }
+        self.medium.get().ok_or_else(no_light)
+    }
+
+    fn method(&self, samples: usize) -> crate::params::Visibility {
+        fit::method(self.params, samples, self.input.mesh.triangles.len())
+    }
+
+    fn place(&self) -> Result<Placing> {
+        let (params, timed) = (self.params, self.timed);
+        let (shape, medium) = (self.shape()?, self.medium()?);
+        let cells = grid_cells(shape.mesh, params.samples);
+        let key = Key::new("distance field", &(shape.mesh.content_hash(), cells));
+        let grid =
+            self.cache.get(&key, || timed.stage("distance field", |p| DistanceGrid::new(shape, cells, p)))?;
+        let skipped = grid.skipped;
+        let layers =
+            timed.stage("layers", |p| layers::build(shape, &grid, medium.medium, params.placement, p))?;
+        let fluence = timed.stage("density", |p| density::evaluate(shape, &layers, medium, params, p))?;
+        let count = layers.len();
+        let ground = Ground { grid, layers, fluence };
+        let (offered, placed) = timed.stage("samples", |p| {
+            let offered = samples::offer(shape, &ground, medium.medium, params, p)?;
+            let placed = samples::place(shape, &offered, params.samples, |_| 1.0, p)?;
+            Ok((offered, placed))
+        })?;
+        let bench = Bench { input: self.input, shape, medium, offered: &offered, params };
+        let (placed, width_factor, refined) = match params.refine {
+            0 => (placed, params.width_factor, None),
+            rounds => timed.stage("refinement", |p| refine::refine(&bench, placed, rounds, p))?,
+        };
+        Ok(Placing { placed, width_factor, refined, layers: count, skipped })
+    }
+
+    /// Block by block: depths in all directions, then their fits, of which alone anything stays.
+    fn light(&self, keys: &Keys, samples: &[Candidate]) -> Result<Lighting> {
+        let (params, timed) = (self.params, self.timed);
+        let ranges = blocks::ranges(samples.len());
+        let exact = if params.certificate { certificate::exact_lights(params.seed) } else { Vec::new() };
+        timed.announce("optical depth", ranges.len() * (params.directions.div_ceil(2) + exact.len()));
+        let method = self.method(samples.len());
+        let mut all: Option<Fits> = None;
+        let (mut keep, mut offset, mut buried, mut dark) = (Vec::new(), Vec::new(), 0, 0);
+        let mut arriving = vec![Vec::new(); exact.len()];
+        for (b, range) in ranges.iter().enumerate() {
+            let own = &samples[range.clone()];
+            let block = (b, ranges.len());
+            let key = Key::new(keys.depths.stage(), &(&keys.depths, block));
+            let lit: Lit = self.cache.get(&key, || {
+                let (shape, medium) = (self.shape()?, self.medium()?);
+                let task = fit::Task { samples: own, block: b, method, held_out: &exact };
+                timed.stage("optical depth", |p| fit::depths(shape, medium, &task, params, p))
+            })?;
+            let make = || {
+                let encoding = all.as_ref().map(|fits| fits.encoding);
+                timed.announce("harmonics", if b == 0 { samples.len() } else { 0 });
+                timed.stage("harmonics", |p| fit::fits(&lit, encoding, params, p))
+            };
+            // The light of a single block is kept as a whole.
+            let fits = match ranges.len() {
+                1 => make()?,
+                _ => self.cache.get(&Key::new("harmonics", &(&keys.lighting, block)), make)?,
+            };
+            match &mut all {
+                Some(all) => all.append(fits),
+                None => all = Some(fits),
+            }
+            buried += lit.buried;
+            dark += lit.dark;
+            keep.extend(lit.keep);
+            offset.extend(lit.offset);
+            arriving.iter_mut().zip(lit.held_out).for_each(|(all, own)| all.extend(own));
+        }
+        let all = all.filter(|_| !offset.is_empty()).ok_or_else(no_light)?;
+        let light = timed.stage("rounding", |p| fit::quantised(all, params, p))?;
+        Ok(Lighting { keep, light, offset, exact: arriving, buried, dark })
+    }
+
+    fn measure(&self, exact: &[Vec<f32>], asset: &Asset) -> Result<Measured> {
+        let (shape, medium) = (self.shape()?, self.medium()?);
+        self.timed
+            .stage("certificate", |p| certificate::measure(shape, medium, exact, asset, self.params.seed, p))
+    }
+}
+
+fn kept(samples: &[Candidate], keep: &[bool]) -> Vec<Candidate> {
+    samples.iter().zip(keep).filter(|(_, keep)| **keep).map(|(s, _)| *s).collect()
+}
+
+fn no_light() -> Error {
+    Error::NoRoom("no light reaches its inside".to_owned())
+}
