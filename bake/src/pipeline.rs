@@ -8,6 +8,7 @@ use crate::cache::{Cache, Key};
 use crate::certificate::{self, Measured};
 use crate::field::{DistanceGrid, Shape, grid_cells};
 use crate::fit::{self, Fits, Light, Lit};
+use crate::measure::exact::means;
 use crate::pack::{self, Stand};
 use crate::params::Params;
 use crate::progress::Timed;
@@ -176,7 +177,8 @@ impl<'a> Pipeline<'a> {
         let (params, timed) = (self.params, self.timed);
         let ranges = blocks::ranges(samples.len());
         let exact = if params.certificate { certificate::exact_lights(params.seed) } else { Vec::new() };
-        timed.announce("optical depth", ranges.len() * (params.directions.div_ceil(2) + exact.len()));
+        // Work is announced when the first block turns out not to be in the cache.
+        let (mut depths_announced, mut fits_announced) = (false, false);
         let method = self.method(samples.len());
         let mut all: Option<Fits> = None;
         let (mut keep, mut offset, mut buried, mut dark) = (Vec::new(), Vec::new(), 0, 0);
@@ -187,12 +189,25 @@ impl<'a> Pipeline<'a> {
             let key = Key::new(keys.depths.stage(), &(&keys.depths, block));
             let lit: Lit = self.cache.get(&key, || {
                 let (shape, medium) = (self.shape()?, self.medium()?);
-                let task = fit::Task { samples: own, block: b, method, held_out: &exact };
-                timed.stage("optical depth", |p| fit::depths(shape, medium, &task, params, p))
+                let task = timed.stage("cells", |_| fit::Task::new(shape, medium, own, b, params))?;
+                if !std::mem::replace(&mut depths_announced, true) {
+                    let blocks = ranges.len() - b;
+                    timed.announce("optical depth", blocks * params.directions.div_ceil(2));
+                }
+                let mut lit =
+                    timed.stage("optical depth", |p| fit::depths(shape, medium, &task, method, params, p))?;
+                if !exact.is_empty() {
+                    let arriving =
+                        timed.stage("held-out light", |p| means(shape, medium, &task.cells, &exact, p))?;
+                    lit.hold_out(arriving);
+                }
+                Ok(lit)
             })?;
-            let make = || {
+            let mut make = || {
                 let encoding = all.as_ref().map(|fits| fits.encoding);
-                timed.announce("harmonics", if b == 0 { samples.len() } else { 0 });
+                if !std::mem::replace(&mut fits_announced, true) {
+                    timed.announce("harmonics", samples.len() - range.start);
+                }
                 timed.stage("harmonics", |p| fit::fits(&lit, encoding, params, p))
             };
             // The light of a single block is kept as a whole.

@@ -97,6 +97,7 @@ impl Report {
         let skipped = BTreeMap::from([
             ("distance_queries".to_owned(), facts.skipped_queries),
             ("dark_or_outside_candidates".to_owned(), facts.placed.dark),
+            ("candidates_without_inside_tests".to_owned(), facts.placed.untested),
             ("samples_without_inside_tests".to_owned(), facts.buried),
             ("dark_directions".to_owned(), facts.dark),
             ("coefficients".to_owned(), unused_coefficients(params, asset)),

@@ -17,6 +17,7 @@ use crate::{Error, Result};
 use half::f16;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
+use std::sync::LazyLock;
 
 /// Bits of a coefficient of `band`.
 pub const fn bits(band: usize) -> u32 {
@@ -237,13 +238,20 @@ impl CodeBook<'_> {
             return 0;
         }
         let u = (value.abs() / unit).min(1.0);
-        // The code below, and whether the next one is nearer.
-        let below = (u.powf(2.0 / 3.0) * most(band)) as i32;
-        let middle = 0.5 * (expanded(below, band) + expanded(below + 1, band));
-        let q = (below + i32::from(u > middle)).min(most(band) as i32);
+        let q = MIDDLES[bits(band) as usize].partition_point(|middle| u > *middle) as i32;
         if value < 0.0 { -q } else { q }
     }
 }
+
+/// For each number of bits: what lies in the middle between the values of neighbouring codes, upwards from 0.
+static MIDDLES: LazyLock<[Vec<f32>; 9]> = LazyLock::new(|| {
+    let mut all = [const { Vec::new() }; 9];
+    for band in 0..MAX_ORDER {
+        let middle = |q: i32| 0.5 * (expanded(q, band) + expanded(q + 1, band));
+        all[bits(band) as usize] = (0..most(band) as i32).map(middle).collect();
+    }
+    all
+});
 
 /// Where a coefficient's code is.
 struct Place {

@@ -50,6 +50,12 @@ impl DistanceGrid {
         (depth > 0.0).then_some(depth)
     }
 
+    /// Whether `p` lies in the ball around the node nearest to it that no surface enters.
+    pub fn certainly_inside(&self, p: DVec3) -> bool {
+        // From the middle of a cell to its corner it is 0.87 cells; depths are rounded.
+        self.depth_near(p).is_some_and(|depth| depth > 0.9 * self.cell)
+    }
+
     pub fn node(&self, index: usize) -> DVec3 {
         let (i, rest) = (index % self.size[0], index / self.size[0]);
         let (j, k) = (rest % self.size[1], rest / self.size[1]);
@@ -92,21 +98,22 @@ impl DistanceGrid {
             .par_chunks(chunk)
             .zip(inside.par_chunks(chunk))
             .map(|(nodes, inside)| {
-                let values = nodes
-                    .iter()
-                    .zip(inside)
-                    .map(|(p, &inside)| {
-                        let limit = if inside { f64::INFINITY } else { band };
-                        match accel.nearest(*p, limit) {
-                            Some(n) if inside => n.distance as f32,
-                            Some(n) => -n.distance as f32,
-                            None => {
-                                skipped.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
-                                -band as f32
-                            }
+                // Depth changes by no more than the distance between nodes: the node before bounds the search.
+                let mut before: Option<(DVec3, f64)> = None;
+                let mut values = Vec::with_capacity(nodes.len());
+                for (p, &inside) in nodes.iter().zip(inside) {
+                    let reach = before.map_or(f64::INFINITY, |(q, d)| 1.000_001 * (d + p.distance(q)));
+                    let found = accel.nearest(*p, if inside { reach } else { reach.min(band) });
+                    before = found.map(|n| (*p, n.distance));
+                    values.push(match found {
+                        Some(n) if inside => n.distance as f32,
+                        Some(n) => -n.distance as f32,
+                        None => {
+                            skipped.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+                            -band as f32
                         }
-                    })
-                    .collect();
+                    });
+                }
                 stage.step(nodes.len())?;
                 Ok(values)
             })

@@ -8,7 +8,6 @@
 use super::cells::{Cells, buried, nearest};
 use crate::cache::bytes;
 use crate::field::Shape;
-use crate::measure::exact;
 use crate::params::{DARK, Params, Visibility};
 use crate::progress::Stage;
 use crate::samples::Candidate;
@@ -73,35 +72,49 @@ pub(crate) fn method(params: &Params, samples: usize, triangles: usize) -> Visib
     visibility::chosen(params.visibility, samples * params.points_per_sample, triangles)
 }
 
-/// One block.
+/// One block of samples.
 pub(crate) struct Task<'a> {
     pub samples: &'a [Candidate],
-    /// Its number.
-    pub block: usize,
-    /// The same for all blocks.
-    pub method: Visibility,
-    /// Lights whose means over all points are wanted: unit vector towards each, and its channel.
-    pub held_out: &'a [(DVec3, usize)],
+    /// The surface point nearest to each, as far as it matters.
+    nearest: Vec<Option<Nearest>>,
+    pub cells: Cells,
+    /// Samples so deep inside that none of their points was tested.
+    buried: usize,
 }
 
-/// What the samples of a block see.
+impl<'a> Task<'a> {
+    /// Draws the cells of block `block`.
+    pub fn new(
+        shape: &Shape<'_>,
+        medium: &Prepared<'_>,
+        samples: &'a [Candidate],
+        block: usize,
+        params: &Params,
+    ) -> Result<Self> {
+        let count = params.points_per_sample;
+        let size = if count == 1 { 1 } else { POOL.next_multiple_of(count) };
+        let nearest = nearest(shape, samples, NEAR.max(f64::from(CELL_RADIUS)));
+        let buried = buried(samples, &nearest);
+        let seed = hash(hash(params.seed, 37), block as u64);
+        let cells = Cells::new(shape, medium.medium, samples, &buried, size, seed)?;
+        Ok(Self { samples, nearest, cells, buried: buried.iter().filter(|b| **b).count() })
+    }
+}
+
+/// What the samples of a block see, without held-out lights; the same `method` for all blocks.
 pub(crate) fn depths(
     shape: &Shape<'_>,
     medium: &Prepared<'_>,
     task: &Task<'_>,
+    method: Visibility,
     params: &Params,
     stage: Stage<'_>,
 ) -> Result<Lit> {
-    let Task { samples, block, method, held_out } = *task;
+    let Task { samples, nearest, cells, buried } = task;
     let directions = directions(params);
     let (n, d) = (samples.len(), directions.len());
     let half = d / 2;
     let count = params.points_per_sample;
-    let size = if count == 1 { 1 } else { POOL.next_multiple_of(count) };
-    let nearest = nearest(shape, samples, NEAR.max(f64::from(CELL_RADIUS)));
-    let buried = buried(samples, &nearest);
-    let seed = hash(hash(params.seed, 37), block as u64);
-    let cells = Cells::new(shape, medium.medium, samples, &buried, size, seed)?;
     let matched = medium.medium.ior() == 1.0;
     let kappa = medium.medium.reference_extinction() as f32;
     let mut transmittance = vec![0u16; n * d];
@@ -144,14 +157,12 @@ pub(crate) fn depths(
             f64::from(light) / d as f64 >= 1e-3 * DARK && !outside
         })
         .collect();
-    let mut held_out = exact::means(shape, medium, &cells, held_out, stage)?;
     let mut offset = cells.offsets(samples);
     let mut surface: Vec<Vec3> =
-        samples.iter().zip(&nearest).map(|(s, n)| towards_surface(shape, s, *n)).collect();
+        samples.iter().zip(nearest).map(|(s, n)| towards_surface(shape, s, *n)).collect();
     if keep.iter().any(|k| !k) {
         compact(&mut transmittance, &keep, d);
         compact(&mut boundary, &keep, if matched { 0 } else { d });
-        held_out.iter_mut().for_each(|light| compact(light, &keep, 1));
         compact(&mut offset, &keep, 1);
         compact(&mut surface, &keep, 1);
     }
@@ -161,8 +172,8 @@ pub(crate) fn depths(
         dark: transmittance.iter().filter(|psi| **psi == 0).count(),
         transmittance,
         boundary,
-        held_out,
-        buried: buried.iter().filter(|b| **b).count(),
+        held_out: Vec::new(),
+        buried: *buried,
         keep,
     })
 }
@@ -214,6 +225,14 @@ fn towards_surface(shape: &Shape<'_>, sample: &Candidate, nearest: Option<Neares
     let on_it = there.length() < 1e-2 * sample.radius;
     let direction = if on_it { shape.accel.normal(nearest.triangle) } else { there.normalize_or_zero() };
     direction.as_vec3()
+}
+
+impl Lit {
+    /// Takes what arrives from held-out lights at all samples of the block, those without light too.
+    pub fn hold_out(&mut self, mut arriving: Vec<Vec<f32>>) {
+        arriving.iter_mut().for_each(|light| compact(light, &self.keep, 1));
+        self.held_out = arriving;
+    }
 }
 
 /// Keeps the rows of `width` values that `keep` says.

@@ -16,6 +16,7 @@ pub(crate) fn means(
     lights: &[(DVec3, usize)],
     stage: Stage<'_>,
 ) -> Result<Vec<Vec<f32>>> {
+    stage.announce(lights.len());
     let points = cells.points();
     lights
         .par_iter()

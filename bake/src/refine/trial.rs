@@ -79,7 +79,7 @@ impl Trial {
         let light = Light::none(placed.samples.len(), boundary_order(medium.ior(), params.order));
         let asset = pack(bench.input, bench.medium.sampled.as_ref(), params, stand, light, weight)?;
         let player = Player::new(&asset, &self.views);
-        stage.announce(2 * LIGHTS);
+        stage.announce(LIGHTS);
         let lights: Vec<(DVec3, usize)> = self.lights.iter().enumerate().map(|(l, d)| (*d, l % 3)).collect();
         let arriving = exact::means(bench.shape, bench.medium, &cells, &lights, stage)?;
         let played = player.radiance(LIGHTS, |i, l| arriving[l][i], Vec3::ONE, stage)?;

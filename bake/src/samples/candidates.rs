@@ -2,7 +2,7 @@
 
 use super::{Candidate, Ground};
 use crate::density::LayerFluence;
-use crate::field::{Shape, inside_nodes};
+use crate::field::{DistanceGrid, Shape, inside_nodes};
 use crate::layers::Layer;
 use crate::params::{BOUNDARY_SNAP, DARK, Params, Placement, RADIUS_EXPONENT};
 use crate::progress::Stage;
@@ -34,6 +34,8 @@ pub(crate) struct Offered {
     /// Samples closer to the boundary than this many radii are moved onto it.
     pub snap: f64,
     pub dark: usize,
+    /// Drawn candidates that needed no inside test.
+    pub untested: usize,
 }
 
 /// One triangle of one layer with the mass of its slab.
@@ -52,7 +54,7 @@ pub(crate) fn offer(
     params: &Params,
     stage: Stage<'_>,
 ) -> Result<Offered> {
-    let Ground { layers, fluence, .. } = ground;
+    let Ground { grid, layers, fluence } = ground;
     let patches = patches(layers, fluence, medium);
     let mean = reference_demand(&patches);
     let relative_radius = |demand: f64| (demand / mean).max(1e-12).powf(-RADIUS_EXPONENT).clamp(0.5, 2.0);
@@ -94,14 +96,15 @@ pub(crate) fn offer(
     };
     // Where light reaches a thin shell only, few candidates are usable: draw again until there are enough.
     let mut list: Vec<Candidate> = Vec::new();
-    let mut dark = 0;
+    let (mut dark, mut untested) = (0, 0);
     for round in 0..ROUNDS {
         let seed = hash(hash(params.seed, 23), round);
         for from in (0..wanted).step_by(TOGETHER) {
             stage.step(0)?;
             let some = from..wanted.min(from + TOGETHER);
             let drawn: Vec<Candidate> = some.into_par_iter().map(|i| one(seed, i)).collect();
-            let kept = usable(shape, medium, &drawn)?;
+            let (kept, without_test) = usable(shape, grid, medium, &drawn)?;
+            untested += without_test;
             dark += drawn.len() - kept.len();
             list.extend(kept);
         }
@@ -114,12 +117,13 @@ pub(crate) fn offer(
         return Err(no_room());
     }
     if on_layers {
-        return Ok(Offered { surface: Vec::new(), list, snap: 0.0, dark });
+        return Ok(Offered { surface: Vec::new(), list, snap: 0.0, dark, untested });
     }
-    let fill = usable(shape, medium, &fill(ground, &list))?;
-    let surface = usable(shape, medium, &surface(shape, ground, medium, &relative_radius, params.seed))?;
+    let (fill, _) = usable(shape, grid, medium, &fill(ground, &list))?;
+    let surface = surface(shape, ground, medium, &relative_radius, params.seed);
+    let (surface, _) = usable(shape, grid, medium, &surface)?;
     list.extend(fill);
-    Ok(Offered { surface, list, snap: BOUNDARY_SNAP, dark })
+    Ok(Offered { surface, list, snap: BOUNDARY_SNAP, dark, untested })
 }
 
 /// Candidates on the boundary: on the first layer in proportion to 1/radius², moved onto the mesh.
@@ -228,14 +232,24 @@ fn fill(Ground { grid, layers, .. }: &Ground, drawn: &[Candidate]) -> Vec<Candid
         .collect()
 }
 
-/// The candidates that are inside, lit and where something scatters.
-fn usable(shape: &Shape<'_>, medium: &Medium, list: &[Candidate]) -> Result<Vec<Candidate>> {
-    let points: Vec<DVec3> = list.iter().map(|c| c.position).collect();
-    let inside = inside_nodes(shape.mesh, &points)?;
-    let keep: Vec<bool> = list
+/// The candidates that are inside, lit and where something scatters, and how many of them needed no test: those in the
+/// ball around a node of the distance grid which no surface enters.
+fn usable(
+    shape: &Shape<'_>,
+    grid: &DistanceGrid,
+    medium: &Medium,
+    list: &[Candidate],
+) -> Result<(Vec<Candidate>, usize)> {
+    let lit = |c: &Candidate| c.fluence >= DARK && medium.density_and_scattering(c.position).1 > 0.0;
+    let certain: Vec<Option<bool>> = list
         .par_iter()
-        .zip(inside)
-        .map(|(c, inside)| inside && c.fluence >= DARK && medium.density_and_scattering(c.position).1 > 0.0)
+        .map(|c| if lit(c) { grid.certainly_inside(c.position).then_some(true) } else { Some(false) })
         .collect();
-    Ok(list.iter().zip(keep).filter(|(_, keep)| *keep).map(|(c, _)| *c).collect())
+    let doubtful: Vec<DVec3> =
+        list.iter().zip(&certain).filter(|(_, c)| c.is_none()).map(|(c, _)| c.position).collect();
+    let mut tested = inside_nodes(shape.mesh, &doubtful)?.into_iter();
+    let kept = |known: &Option<bool>| known.unwrap_or_else(|| tested.next().unwrap_or(false));
+    let keep: Vec<bool> = certain.iter().map(kept).collect();
+    let kept = list.iter().zip(keep).filter(|(_, keep)| *keep).map(|(c, _)| *c).collect();
+    Ok((kept, list.len() - doubtful.len()))
 }

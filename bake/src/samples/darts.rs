@@ -23,7 +23,7 @@ pub(super) fn throw_to_count(
         if best.as_ref().is_none_or(|b| error(count) < error(b.len())) {
             best = Some(kept);
         }
-        if error(count) < 0.01 {
+        if error(count) < CLOSE {
             break;
         }
         // The count falls with the cube of the scale, less steeply where candidates run out.
@@ -42,6 +42,9 @@ struct Cells {
     /// Neighbouring cells, nearest first, with the least distance to them in cells.
     offsets: Vec<([i64; 3], f64)>,
 }
+
+/// Relative difference to the wanted number that ends the search.
+const CLOSE: f64 = 0.02;
 
 const NONE: u32 = u32::MAX;
 

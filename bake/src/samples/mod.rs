@@ -60,6 +60,8 @@ pub(crate) struct Placed {
     pub snapped: usize,
     /// Candidates without light or scattering that were left out.
     pub dark: usize,
+    /// Candidates that needed no inside test.
+    pub untested: usize,
 }
 
 /// Inside points for each sample when weights are fitted.
@@ -89,7 +91,7 @@ pub(crate) fn place(
     };
     let order = morton::order(probes.iter().map(|c| c.position), low, high);
     let probes = order.into_iter().map(probe).collect();
-    Ok(Placed { samples, probes, snapped, dark: offered.dark })
+    Ok(Placed { samples, probes, snapped, dark: offered.dark, untested: offered.untested })
 }
 
 /// Moves samples close to the boundary onto it, just inside, and rounds all positions to what the asset stores.
