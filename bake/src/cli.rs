@@ -7,7 +7,7 @@ use anyhow::{Context, bail};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use diaphane_bake::params::{Params, Preset, Representation, Visibility};
 use diaphane_bake::report::Report;
-use diaphane_bake::{Input, bake};
+use diaphane_bake::{Input, bake, memory};
 use diaphane_formats::{asset, files, material, mesh};
 use std::path::{Path, PathBuf};
 
@@ -248,7 +248,12 @@ pub fn run_bake(arguments: &Arguments, bars: &Bars) -> anyhow::Result<Report> {
         mesh_name: file_name(mesh_path),
         material_name: file_name(material_path),
     };
-    let result = bake(&input, &arguments.params(), bars);
+    let params = arguments.params();
+    let needed = memory::required(&input, &params)?;
+    if !arguments.quiet {
+        eprintln!("about {} of memory will be needed", memory::megabytes(needed));
+    }
+    let result = bake(&input, &params, bars);
     bars.finish();
     let (baked, report) = result?;
     asset::write(output, &baked)?;

@@ -80,17 +80,17 @@ impl<'a> Prepared<'a> {
 /// # Errors
 /// Parameters out of range, a mesh that leaves no room for samples, an error that cannot be met, cancellation.
 pub fn bake(input: &Input<'_>, params: &Params, progress: &dyn Progress) -> Result<(Asset, Report)> {
-    params.validate()?;
+    memory::required(input, params)?;
     let cache = Cache::open(params.cache.as_deref())?;
     let timed = Timed::new(progress);
     let mut params = params.clone();
     let mut goal = Goal::default();
     loop {
-        memory::require(input, &params)?;
         let baked = Pipeline::new(input, &params, &cache, &timed).run()?;
         match goal.next(&params, baked.0.info.certificate.as_ref())? {
             None => return Ok(baked),
             Some(next) => params = next,
         }
+        memory::required(input, &params)?;
     }
 }

@@ -112,6 +112,7 @@ impl<'a> Pipeline<'a> {
             asset.info.certificate = Some(measured.certificate(self.input.medium));
         }
         let facts = Facts {
+            medium: self.input.medium,
             placed,
             refinement: placing.refined.clone(),
             layers: placing.layers,

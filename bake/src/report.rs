@@ -5,6 +5,7 @@ use crate::memory::{self, MemoryReport};
 use crate::params::{Params, Visibility};
 use crate::samples::Placed;
 use diaphane_formats::asset::{Asset, Certificate, encode};
+use diaphane_formats::medium::Medium;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -65,6 +66,7 @@ pub struct Report {
 
 /// What the stages tell.
 pub(crate) struct Facts<'a> {
+    pub medium: &'a Medium,
     pub placed: &'a Placed,
     pub refinement: Option<Refinement>,
     pub layers: usize,
@@ -129,7 +131,7 @@ impl Report {
             shortfalls,
             warnings: asset.info.provenance.mesh_report.warnings(),
             cache,
-            memory: memory::report(params, asset),
+            memory: memory::report(params, facts.medium, asset),
         }
     }
 }

@@ -14,14 +14,24 @@ use diaphane_formats::phase::Phase;
 use glam::DVec3;
 
 fn run(flat: bool, params: &Params) -> diaphane_bake::Result<(Asset, Report)> {
-    run_with(flat, 0.8, params)
+    run_with(flat, 4.0, 0.8, params)
 }
 
-fn run_with(flat: bool, albedo: f64, params: &Params) -> diaphane_bake::Result<(Asset, Report)> {
+fn run_with(
+    flat: bool,
+    extinction: f64,
+    albedo: f64,
+    params: &Params,
+) -> diaphane_bake::Result<(Asset, Report)> {
     let raw = if flat { cuboid([0.5; 3], 2) } else { icosphere(1.0, 4) };
     let (mesh, report) = Mesh::from_triangles(raw.positions, raw.triangles).unwrap();
-    let medium =
-        Medium::new(DVec3::splat(4.0), DVec3::splat(albedo), Phase::Isotropic, 1.0, Density::Uniform(1.0));
+    let medium = Medium::new(
+        DVec3::splat(extinction),
+        DVec3::splat(albedo),
+        Phase::Isotropic,
+        1.0,
+        Density::Uniform(1.0),
+    );
     let input = Input {
         mesh: &mesh,
         mesh_report: &report,
@@ -68,11 +78,21 @@ fn refinement_is_the_same_for_any_number_of_threads() {
 #[test]
 fn what_sends_no_light_is_not_refined() {
     let params = Params { samples: 600, refine: 3, ..small() };
-    let (asset, report) = run_with(false, 0.0, &params).unwrap();
+    let (asset, report) = run_with(false, 0.0, 0.8, &params).unwrap();
     let done = report.refinement.unwrap();
     assert!(done.before == f64::INFINITY && done.after == f64::INFINITY, "{done:?}");
     assert_eq!(asset.info.width_factor, params.width_factor);
     assert_eq!(done.moves, 1, "a first move that does not pay is the last");
+}
+
+#[test]
+fn albedo_makes_no_difference_to_the_samples() {
+    let params = Params { samples: 600, refine: 1, ..small() };
+    let (bright, _) = run_with(false, 4.0, 0.8, &params).unwrap();
+    let (dark, _) = run_with(false, 4.0, 0.0, &params).unwrap();
+    assert_eq!(bright.samples, dark.samples);
+    assert!(bright.info.certificate.unwrap().error.is_some());
+    assert!(dark.info.certificate.unwrap().error.is_none(), "an error of no light is none");
 }
 
 #[test]

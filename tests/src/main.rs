@@ -35,6 +35,8 @@ enum Command {
     Sweep(Box<commands::sweep::Arguments>),
     /// Measure how fast bakes are, as ratios within one run
     BakeSpeed(commands::bake_speed::Arguments),
+    /// Measure how the time of a bake grows with samples, triangles and directions
+    BakeScaling(commands::bake_scaling::Arguments),
 }
 
 fn main() -> ExitCode {
@@ -58,6 +60,7 @@ fn main() -> ExitCode {
         Command::Range(a) => commands::range::run(&a),
         Command::Sweep(a) => commands::sweep::run(&a),
         Command::BakeSpeed(a) => commands::bake_speed::run(&a),
+        Command::BakeScaling(a) => commands::bake_scaling::run(&a),
     };
     match result {
         Ok(true) => ExitCode::SUCCESS,

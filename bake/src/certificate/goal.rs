@@ -77,7 +77,7 @@ impl Goal {
                 next.order = (params.order + step).min(MAX_ORDER);
                 next.light_error = params.light_error.min(0.2 * most);
                 // The fit needs a few directions for each coefficient.
-                next.directions = params.directions.max(5 * coefficient_count(next.order) / 2);
+                next.directions = params.directions.max(5 * coefficient_count(next.order));
             }
             Knob::Samples => {
                 let room =

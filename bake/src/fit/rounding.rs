@@ -14,7 +14,7 @@ use ndarray::Array2;
 use pulp::Arch;
 
 /// Times that all coefficients are gone through.
-const SWEEPS: usize = 2;
+const SWEEPS: usize = 3;
 
 /// The basis by columns: row k of `columns` is coefficient k in the first half of the directions.
 pub(super) struct Rounding {

@@ -95,7 +95,7 @@ pub(crate) fn offer(
         Candidate { position, radius, fluence }
     };
     // Where light reaches a thin shell only, few candidates are usable: draw again until there are enough.
-    let mut list: Vec<Candidate> = Vec::new();
+    let mut list: Vec<Candidate> = Vec::with_capacity(wanted);
     let (mut dark, mut untested) = (0, 0);
     for round in 0..ROUNDS {
         let seed = hash(hash(params.seed, 23), round);

@@ -8,7 +8,8 @@ use diaphane_formats::visibility::Accel;
 use std::path::PathBuf;
 use validation::range::objects::Object;
 use validation::speed::bakes::{by, medium, seconds, stages, timed};
-use validation::speed::visibility::{agreement, points_inside, rates};
+use validation::speed::ball::bumpy_ball;
+use validation::speed::visibility::{agreement, along_the_curve, points_inside, rates};
 use validation::speed::{Line, text};
 
 /// What to measure on.
@@ -16,12 +17,16 @@ use validation::speed::{Line, text};
 #[command(
     after_help = "Ratios are taken within one run, so that they mean the same on any machine. Close other programs: they \
                   take part in the measurement.\n\nExamples:\n  diaphane-validate bake-speed\n  diaphane-validate \
-                  bake-speed --mesh bunny.obj --points 1000000 --lines 10000000"
+                  bake-speed --mesh bunny.obj --points 1000000 --lines 10000000\n  diaphane-validate bake-speed --ball 500000 \
+                  --lines 10000000 --no-bakes"
 )]
 pub struct Arguments {
     /// The mesh (OBJ); the built-in bird if not given
     #[arg(long, value_name = "MESH.obj")]
     mesh: Option<PathBuf>,
+    /// A bumpy ball of about so many triangles instead
+    #[arg(long, value_name = "N", conflicts_with = "mesh")]
+    ball: Option<usize>,
     /// Points for the rates of both methods
     #[arg(long, value_name = "N", default_value_t = 100_000)]
     points: usize,
@@ -49,13 +54,14 @@ const COMPARED: usize = 50_000;
 /// Measures and prints.
 pub fn run(a: &Arguments) -> anyhow::Result<bool> {
     anyhow::ensure!(a.points > 0 && a.lines > 0, "--points and --lines must be at least 1");
-    let mesh: Mesh = match &a.mesh {
-        Some(path) => {
+    let mesh: Mesh = match (&a.mesh, a.ball) {
+        (Some(path), _) => {
             let (mesh, report) = mesh::load_obj(path)?;
             warn(&report.warnings());
             mesh
         }
-        None => Object::Bird.place()?.mesh,
+        (None, Some(triangles)) => bumpy_ball(triangles)?,
+        (None, None) => Object::Bird.place()?.mesh,
     };
     let even = medium(&mesh, false)?;
     let accel = Accel::new(&mesh);
@@ -64,12 +70,16 @@ pub fn run(a: &Arguments) -> anyhow::Result<bool> {
     tell("rays per second by both methods ...");
     let points = points_inside(&mesh, &accel, a.points, 0.0, 3);
     anyhow::ensure!(!points.is_empty(), "no point inside the mesh was found");
-    let r = rates(&mesh, &accel, &even, &points, DIRECTIONS, TRACED);
     let count = points.len();
+    lines.push(Line::new("points", count.to_string()));
     let million = |rate: f64| format!("{:.2} M/s", rate / 1e6);
-    lines.push(Line::new("rays of one thread, traced", million(r.trace)));
-    lines.push(Line::new(format!("rays of one thread, projected, {count} points"), million(r.project)));
-    lines.push(Line::new("  projected over traced", format!("{:.1}", r.project / r.trace)));
+    let curve = along_the_curve(&points);
+    for (order, points) in [("at random", &points), ("in a bake's order", &curve)] {
+        let r = rates(&mesh, &accel, &even, points, DIRECTIONS, TRACED);
+        lines.push(Line::new(format!("rays of one thread, points {order}, traced"), million(r.trace)));
+        lines.push(Line::new("  projected", million(r.project)));
+        lines.push(Line::new("  projected over traced", format!("{:.1}", r.project / r.trace)));
+    }
 
     tell("agreement of both methods ...");
     let some = &points[..count.min(COMPARED)];

@@ -1,5 +1,6 @@
 //! One module for each command; each returns whether its checks passed, or the error that ends the program with 2.
 
+pub mod bake_scaling;
 pub mod bake_speed;
 pub mod compare;
 pub mod demo;

@@ -11,6 +11,8 @@ pub enum Unit {
     Bytes,
     /// A fraction, shown in percent.
     Percent,
+    /// Things.
+    Count,
 }
 
 impl Unit {
@@ -24,6 +26,9 @@ impl Unit {
             Self::Bytes if value >= 1e3 => format!("{} kB", plain(value / 1e3)),
             Self::Bytes => format!("{} B", plain(value)),
             Self::Percent => format!("{} %", plain(100.0 * value)),
+            Self::Count if value >= 1e6 => format!("{} M", plain(value / 1e6)),
+            Self::Count if value >= 1e3 => format!("{} k", plain(value / 1e3)),
+            Self::Count => plain(value),
         }
     }
 }

@@ -103,6 +103,9 @@ fn legend(svg: &mut Svg, chart: &Chart) {
         svg.label([x + 10.0, y], &series.name, Anchor::Start, "");
         x += 26.0 + 6.6 * series.name.chars().count() as f64;
     }
+    if !chart.panels.iter().flat_map(|p| &p.series).flat_map(|s| &s.points).any(|p| p.front) {
+        return;
+    }
     svg.polyline(&[[x - 6.0, y - 4.0], [x + 14.0, y - 4.0]], FRONT, 7.0);
     svg.circle([x + 4.0, y - 4.0], 7.5, "none", "#000000", "");
     svg.label([x + 20.0, y], "front: nothing is better in both", Anchor::Start, "");

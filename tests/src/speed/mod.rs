@@ -1,6 +1,8 @@
 //! How fast a bake is: ratios within one run, because machines differ and are shared.
 
 pub mod bakes;
+pub mod ball;
+pub mod scaling;
 pub mod visibility;
 
 /// One line of the table.
