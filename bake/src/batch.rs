@@ -145,9 +145,9 @@ fn command_line(mut options: Table, folder: &Path) -> anyhow::Result<Vec<String>
         None => Ok(None),
     };
     let mut line = vec!["diaphane-bake".to_owned()];
-    for key in ["mesh", "material", "output", "report"] {
+    for key in ["mesh", "material", "output", "report", "cache"] {
         let Some(path) = path(key)? else {
-            ensure!(key == "report", "'{key}' is missing");
+            ensure!(["report", "cache"].contains(&key), "'{key}' is missing");
             continue;
         };
         line.extend((key != "mesh").then(|| format!("--{key}")));
@@ -189,14 +189,14 @@ mod tests {
 
     #[test]
     fn entries_become_command_lines() {
-        let list = "[defaults]\nseed = 7\n[[bake]]\nmesh = \"a b.obj\"\nmaterial = \"m.toml\"\noutput = \"/o/a.dph\"\n\
+        let list = "[defaults]\nseed = 7\ncache = \"kept\"\n[[bake]]\nmesh = \"a b.obj\"\nmaterial = \"m.toml\"\noutput = \"/o/a.dph\"\n\
                     seed = 8\nno-certificate = true\nlight-error = 0.02\n[[bake]]\nmesh = \"it's.obj\"\nmaterial = \
                     \"m.toml\"\noutput = \"b.dph\"\npreset = \"draft\"\n";
         assert_eq!(
             lines(list).unwrap(),
             [
-                "diaphane-bake 'in/a b.obj' --material in/m.toml --output /o/a.dph --light-error 0.02 --no-certificate --seed 8",
-                r"diaphane-bake 'in/it'\''s.obj' --material in/m.toml --output in/b.dph --preset draft --seed 7",
+                "diaphane-bake 'in/a b.obj' --material in/m.toml --output /o/a.dph --cache in/kept --light-error 0.02 --no-certificate --seed 8",
+                r"diaphane-bake 'in/it'\''s.obj' --material in/m.toml --output in/b.dph --cache in/kept --preset draft --seed 7",
             ]
         );
     }

@@ -52,7 +52,8 @@ pub fn predicted(params: &Params, medium: &Medium, triangles: usize) -> u64 {
     let stages = [
         PLACING * samples,
         STANDING * samples + block * (directions + CELL),
-        WEIGHTS * samples,
+        // Refinement tries wider kernels, which overlap more.
+        if params.refine == 0 { WEIGHTS * samples } else { WEIGHTS * samples * 7 / 2 },
         if params.certificate { PLAYING * samples } else { 0 },
     ];
     let most = stages.into_iter().max().unwrap_or(0);

@@ -28,6 +28,8 @@ struct Placing {
     width_factor: f32,
     refined: Option<Refinement>,
     layers: usize,
+    /// Layers too deep for any light.
+    dark_layers: usize,
     /// Nodes of the distance grid without a query.
     skipped: usize,
 }
@@ -116,6 +118,7 @@ impl<'a> Pipeline<'a> {
             placed,
             refinement: placing.refined.clone(),
             layers: placing.layers,
+            dark_layers: placing.dark_layers,
             skipped_queries: placing.skipped,
             buried,
             dark,
@@ -155,7 +158,7 @@ impl<'a> Pipeline<'a> {
         let grid =
             self.cache.get(&key, || timed.stage("distance field", |p| DistanceGrid::new(shape, cells, p)))?;
         let skipped = grid.skipped;
-        let layers =
+        let (layers, dark_layers) =
             timed.stage("layers", |p| layers::build(shape, &grid, medium.medium, params.placement, p))?;
         let fluence = timed.stage("density", |p| density::evaluate(shape, &layers, medium, params, p))?;
         let count = layers.len();
@@ -170,7 +173,7 @@ impl<'a> Pipeline<'a> {
             0 => (placed, params.width_factor, None),
             rounds => timed.stage("refinement", |p| refine::refine(&bench, placed, rounds, p))?,
         };
-        Ok(Placing { placed, width_factor, refined, layers: count, skipped })
+        Ok(Placing { placed, width_factor, refined, layers: count, dark_layers, skipped })
     }
 
     /// Block by block: depths in all directions, then their fits, of which alone anything stays.

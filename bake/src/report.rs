@@ -2,7 +2,7 @@
 
 use crate::cache::CacheReport;
 use crate::memory::{self, MemoryReport};
-use crate::params::{Params, Visibility};
+use crate::params::{DENSITY_VOXELS, Params, Visibility};
 use crate::samples::Placed;
 use diaphane_formats::asset::{Asset, Certificate, encode};
 use diaphane_formats::medium::Medium;
@@ -70,6 +70,7 @@ pub(crate) struct Facts<'a> {
     pub placed: &'a Placed,
     pub refinement: Option<Refinement>,
     pub layers: usize,
+    pub dark_layers: usize,
     pub skipped_queries: usize,
     pub buried: usize,
     pub dark: usize,
@@ -98,6 +99,8 @@ impl Report {
         seconds.insert("total".to_owned(), stages.iter().map(|(_, s)| s).sum());
         let skipped = BTreeMap::from([
             ("distance_queries".to_owned(), facts.skipped_queries),
+            ("layers_below_all_light".to_owned(), facts.dark_layers),
+            ("density_voxels".to_owned(), if asset.density.is_none() { DENSITY_VOXELS.pow(3) } else { 0 }),
             ("dark_or_outside_candidates".to_owned(), facts.placed.dark),
             ("candidates_without_inside_tests".to_owned(), facts.placed.untested),
             ("samples_without_inside_tests".to_owned(), facts.buried),

@@ -17,6 +17,7 @@ use crate::{Error, Result};
 use half::f16;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
+use std::convert::Infallible;
 use std::sync::LazyLock;
 
 /// Bits of a coefficient of `band`.
@@ -116,25 +117,36 @@ impl Coefficients {
 
     /// Quantises, every coefficient to the nearest code. Values that are not finite count as 0.
     pub fn quantised(&self) -> Harmonics {
-        self.quantised_by(|_, _, _| {})
+        let Ok(out) = self.quantised_by(|_, _, _| Ok::<(), Infallible>(()));
+        out
     }
 
     /// Quantises; `choose` gets each function's index, its code book and the nearest codes, and may take others.
-    pub fn quantised_by(&self, choose: impl Fn(usize, &CodeBook<'_>, &mut [i32]) + Sync) -> Harmonics {
+    ///
+    /// # Errors
+    /// The first of `choose`, which ends it.
+    pub fn quantised_by<E: Send>(
+        &self,
+        choose: impl Fn(usize, &CodeBook<'_>, &mut [i32]) -> std::result::Result<(), E> + Sync,
+    ) -> std::result::Result<Harmonics, E> {
         let profile = self.profile();
         let one = |i: usize| {
             let (scale, mut q) = quantise(self.of(i), &profile);
-            choose(i, &CodeBook { scale: scale.to_f32(), profile: &profile }, &mut q);
-            (scale, q)
+            choose(i, &CodeBook { scale: scale.to_f32(), profile: &profile }, &mut q)?;
+            Ok((scale, q))
         };
-        let all: Vec<(f16, Vec<i32>)> = (0..self.len()).into_par_iter().with_min_len(64).map(one).collect();
+        let all: Vec<(f16, Vec<i32>)> = (0..self.len())
+            .into_par_iter()
+            .with_min_len(64)
+            .map(one)
+            .collect::<std::result::Result<_, E>>()?;
         let mut out = Harmonics { order: self.order.clone(), ..Harmonics::default() };
         for (scale, q) in all {
             out.scale.push(scale);
             put(&q, &mut out.codes);
         }
         out.profile = profile;
-        out
+        Ok(out)
     }
 
     /// Root mean square of each band's coefficients, functions normalised, relative to band 0.

@@ -68,9 +68,11 @@ pub(crate) fn measure(
     stage.announce(VIEWS + 2 * LIGHTS + EXACT.len());
     // As a reader gets it, after all rounding.
     let asset = asset::parse(&asset::encode(packed)?)?;
+    stage.step(0)?;
     let views = views::views(shape, medium.medium.ior(), VIEWS, hash(stream(seed), 1), stage)?;
     let lights = lights(seed);
     let nodes = Nodes::new(&views, medium, hash(stream(seed), 3));
+    stage.step(0)?;
     let player = Player::new(&asset, &views);
     let truth = nodes.radiance(shape, medium, &lights, stage)?;
     let stored = Stored::new(&asset, &lights);

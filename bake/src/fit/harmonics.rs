@@ -15,9 +15,9 @@ use super::depths::{Lit, directions};
 use super::least_squares::{BATCH, Basis, Batch, coefficient_places, in_order};
 use super::levels::Levels;
 use super::rounding::Rounding;
-use crate::Result;
 use crate::params::{Params, Representation};
 use crate::progress::Stage;
+use crate::{Error, Result};
 use diaphane_formats::encoding::Encoding;
 use diaphane_formats::harmonics::{Coefficients, Harmonics, bytes};
 use diaphane_formats::lobe;
@@ -140,16 +140,13 @@ pub(crate) fn quantised(fits: Fits, params: &Params, stage: Stage<'_>) -> Result
     let basis = Basis::new(&directions, params.peak_order());
     let rounding = Rounding::new(&basis, params.peak_order(), encoding);
     stage.announce(exact.len());
-    let depth = exact.quantised_by(|i, book, codes| {
-        if stage.step(1).is_err() {
-            return;
-        }
+    let depth = exact.quantised_by::<Error>(|i, book, codes| {
+        stage.step(1)?;
         let lobe = lobe.get(i).copied().unwrap_or(Vec3::ZERO);
         let beside = |d: usize| lobe.dot(directions[d].as_vec3()).max(0.0);
         rounding.choose(exact.of(i), beside, book, codes);
-    });
-    // Whoever asked to stop gets no half-rounded asset.
-    stage.step(0)?;
+        Ok(())
+    })?;
     Ok(Light { encoding, depth, lobe, boundary })
 }
 

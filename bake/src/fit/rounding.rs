@@ -139,8 +139,11 @@ mod tests {
             }
         }
         let plain = exact.quantised().decoded();
-        let chosen =
-            exact.quantised_by(|i, book, q| rounding.choose(exact.of(i), |_| 0.0, book, q)).decoded();
+        let choose = |i: usize, book: &CodeBook<'_>, q: &mut [i32]| {
+            rounding.choose(exact.of(i), |_| 0.0, book, q);
+            Ok::<(), std::convert::Infallible>(())
+        };
+        let chosen = exact.quantised_by(choose).unwrap().decoded();
         let value = |c: &[f32], d: usize| -> f32 {
             let opposite = |k: usize| if d >= half && rounding.bands[k] % 2 == 1 { -1.0 } else { 1.0 };
             c.iter().enumerate().map(|(k, c)| c * opposite(k) * rounding.columns[[k, d % half]]).sum()

@@ -7,7 +7,7 @@ mod isosurface;
 
 use crate::Result;
 use crate::field::{DistanceGrid, Shape};
-use crate::params::Placement;
+use crate::params::{DARK, Placement};
 use crate::progress::Stage;
 use diaphane_formats::medium::Medium;
 use glam::DVec3;
@@ -30,13 +30,14 @@ const GROWTH: f64 = 1.25;
 /// The thesis' constant offset in mean spacings of samples.
 const THESIS_OFFSET: f64 = 0.5;
 
+/// Layers from the boundary inwards, and how many more there would be where no light arrives.
 pub(crate) fn build(
     shape: &Shape<'_>,
     grid: &DistanceGrid,
     medium: &Medium,
     placement: Placement,
     stage: Stage<'_>,
-) -> Result<Vec<Layer>> {
+) -> Result<(Vec<Layer>, usize)> {
     let deepest = grid.depth.iter().copied().fold(0.0, f32::max) as f64;
     // Slabs no thicker than the samples' spacing or half a mean free path near the surface.
     let kappa = medium.reference_extinction().max(1e-9 / shape.diagonal);
@@ -49,8 +50,11 @@ pub(crate) fn build(
         offsets.push(next);
         step = (step * growth).min(4.0 * shape.spacing.max(first));
     }
-    stage.announce(offsets.len());
-    let layers = offsets
+    // From any point light passes its depth at least; the isosurface is good to a cell of the grid.
+    let lit = -DARK.ln() / (kappa * medium.least_density()) + grid.cell;
+    let count = offsets.iter().take_while(|offset| **offset <= lit).count();
+    stage.announce(count);
+    let layers = offsets[..count]
         .par_iter()
         .enumerate()
         .map(|(i, &offset)| {
@@ -62,5 +66,48 @@ pub(crate) fn build(
             Ok(layer)
         })
         .collect::<Result<Vec<_>>>()?;
-    Ok(layers.into_iter().filter(|l| !l.triangles.is_empty()).collect())
+    let layers = layers.into_iter().filter(|l| !l.triangles.is_empty()).collect();
+    Ok((layers, offsets.len() - count))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::params::Params;
+    use crate::progress::{Silent, Timed};
+    use crate::{Prepared, density};
+    use diaphane_assets::shapes::icosphere;
+    use diaphane_formats::medium::Density;
+    use diaphane_formats::mesh::Mesh;
+    use diaphane_formats::phase::Phase;
+
+    #[test]
+    fn layers_that_are_left_out_are_dark() {
+        let raw = icosphere(1.0, 4);
+        let mesh = Mesh::from_triangles(raw.positions, raw.triangles).unwrap().0;
+        let params = Params { samples: 3_000, ..Params::default() };
+        let shape = Shape::new(&mesh, &params);
+        let timed = Timed::new(&Silent);
+        let grid = timed.stage("grid", |p| DistanceGrid::new(&shape, 40.0, p)).unwrap();
+        let medium = |kappa: f64| {
+            let even = Density::Uniform(2.0);
+            Medium::new(DVec3::splat(kappa), DVec3::ONE, Phase::Isotropic, 1.0, even).unwrap()
+        };
+        let built = |m: &Medium| timed.stage("layers", |p| build(&shape, &grid, m, Placement::Boundary, p));
+        assert_eq!(built(&medium(1.0)).unwrap().1, 0);
+        let dense = medium(8.0);
+        let (layers, left_out) = built(&dense).unwrap();
+        assert!(layers.len() > 2 && left_out > 0, "{} {left_out}", layers.len());
+        // One just below them is dark everywhere, one a little above is not.
+        let last = &layers[layers.len() - 1];
+        let mut below = isosurface::extract(&grid, (last.offset + last.thickness) as f32);
+        below.thickness = 0.01;
+        let prepared = Prepared::new(&dense, &mesh);
+        let light =
+            timed.stage("density", |p| density::evaluate(&shape, &[below], &prepared, &params, p)).unwrap();
+        assert!(!light.top[0].is_empty() && light.top[0].iter().all(|f| f64::from(*f) < DARK));
+        let all =
+            timed.stage("density", |p| density::evaluate(&shape, &layers, &prepared, &params, p)).unwrap();
+        assert!(all.top[layers.len() - 3].iter().any(|f| f64::from(*f) > DARK));
+    }
 }

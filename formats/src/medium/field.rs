@@ -90,6 +90,17 @@ impl Density {
         }
     }
 
+    /// What ρ is nowhere below.
+    pub fn least(&self) -> f64 {
+        match self {
+            Self::Uniform(rho) => *rho,
+            Self::Grid(grid) => f64::from(grid.values().iter().copied().fold(f32::INFINITY, f32::min)),
+            Self::Layers(layers) => layers.densities.iter().copied().fold(f64::INFINITY, f64::min),
+            Self::Noise(noise) => noise.range[0].min(noise.range[1]),
+            Self::Shapes(shapes) => shapes.shapes.iter().map(|s| s.density).fold(shapes.base, f64::min),
+        }
+    }
+
     /// Length over which ρ may change noticeably, mesh units; infinite for a uniform field.
     pub fn feature(&self) -> f64 {
         match self {
@@ -125,7 +136,29 @@ pub(super) fn march(
 
 #[cfg(test)]
 mod tests {
+    use super::super::{Shape, Solid};
     use super::*;
+
+    #[test]
+    fn nothing_lies_below_the_least() {
+        let hole =
+            Shape { solid: Solid::Sphere { center: DVec3::ZERO, radius: 0.5 }, density: 0.3, absorb: false };
+        let values = (0..64).map(|i| 0.5 + (i * 37 % 64) as f32).collect();
+        for density in [
+            Density::Uniform(0.7),
+            Density::Grid(Grid::new([4; 3], DVec3::NEG_ONE, DVec3::ONE, values).unwrap()),
+            Density::Layers(Layers { axis: DVec3::Y, period: 0.3, densities: vec![2.0, 0.4, 1.0] }),
+            Density::Noise(Noise { seed: 3, frequency: 4.0, octaves: 3, range: [0.2, 1.5] }),
+            Density::Shapes(Shapes { base: 1.0, shapes: vec![hole] }),
+        ] {
+            let at = |i: i32| {
+                DVec3::new(f64::from(i % 11), f64::from(i / 11 % 11), f64::from(i / 121)) / 5.0 - 1.0
+            };
+            let lowest = (0..1331).map(|i| density.value(at(i)).0).fold(f64::INFINITY, f64::min);
+            let least = density.least();
+            assert!(least > 0.0 && lowest >= least && lowest < 4.0 * least, "{density:?}: {lowest} {least}");
+        }
+    }
 
     #[test]
     fn layers_integrate_exactly() {

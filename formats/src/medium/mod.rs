@@ -138,6 +138,11 @@ impl Medium {
         self.density.value(x).0
     }
 
+    /// What ρ is nowhere below.
+    pub fn least_density(&self) -> f64 {
+        self.density.least()
+    }
+
     /// ρ and the part of it that scatters, at a point.
     pub fn density_and_scattering(&self, x: DVec3) -> (f64, f64) {
         self.density.value(x)
