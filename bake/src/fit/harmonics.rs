@@ -12,7 +12,7 @@
 
 use super::boundary::{BOUNDARY_ORDER, boundary};
 use super::depths::{Lit, directions};
-use super::least_squares::{BATCH, Basis, Batch, coefficient_places, in_order};
+use super::least_squares::{BATCH, Batch, coefficient_places, in_order};
 use super::levels::Levels;
 use super::rounding::Rounding;
 use crate::params::{Params, Representation};
@@ -137,14 +137,17 @@ pub(crate) fn quantised(fits: Fits, params: &Params, stage: Stage<'_>) -> Result
         }
     };
     let exact = Coefficients { values, ..Coefficients::zeros(order) };
-    let basis = Basis::new(&directions, params.peak_order());
-    let rounding = Rounding::new(&basis, params.peak_order(), encoding);
+    let levels = Levels::new(&directions, params.peak_order());
+    // A part of the directions tells as much where it is enough.
+    let rounders =
+        levels.each().map(|level| (level, Rounding::new(&level.basis, params.peak_order(), encoding)));
     stage.announce(exact.len());
     let depth = exact.quantised_by::<Error>(|i, book, codes| {
         stage.step(1)?;
         let lobe = lobe.get(i).copied().unwrap_or(Vec3::ZERO);
-        let beside = |d: usize| lobe.dot(directions[d].as_vec3()).max(0.0);
-        rounding.choose(exact.of(i), beside, book, codes);
+        let x = exact.of(i);
+        let (level, rounding) = &rounders[levels.smallest(x.len())];
+        rounding.choose(x, |d| lobe.dot(level.directions[d]).max(0.0), book, codes);
         Ok(())
     })?;
     Ok(Light { encoding, depth, lobe, boundary })

@@ -5,12 +5,11 @@ use super::least_squares::Basis;
 use glam::{DVec3, Vec3};
 use ndarray::Array2;
 
-/// Every so manieth pair is in the part: 3 goes well with the golden angle of [`even_directions`], three turns of which are
-/// a good angle too.
+/// Every so manieth pair is in a part. Three and two golden angles, by which [`even_directions`] turn, are good angles too.
 ///
 /// [`even_directions`]: diaphane_formats::directions::even_directions
-const PART: usize = 3;
-/// Directions of the part for each unknown, at least.
+const PARTS: [usize; 2] = [3, 2];
+/// Directions of a part for each unknown, at least.
 const EACH: usize = 3;
 
 /// Some of the directions, with the harmonics in them.
@@ -51,20 +50,36 @@ impl Level {
     }
 }
 
-/// Both levels.
+/// All directions and parts of them.
 pub(super) struct Levels {
-    part: Level,
+    /// Smallest first.
+    parts: [Level; 2],
     pub all: Level,
 }
 
 impl Levels {
     /// For fits of at most `order` bands in `directions`: opposite pairs, all first ones before all second ones.
     pub fn new(directions: &[DVec3], order: usize) -> Self {
-        Self { part: Level::new(directions, order, PART), all: Level::new(directions, order, 1) }
+        Self {
+            parts: PARTS.map(|step| Level::new(directions, order, step)),
+            all: Level::new(directions, order, 1),
+        }
     }
 
-    /// A part of the directions, if it is enough for so many unknowns.
+    /// All levels, the smallest first and all directions last.
+    pub fn each(&self) -> [&Level; PARTS.len() + 1] {
+        let [a, b] = &self.parts;
+        [a, b, &self.all]
+    }
+
+    /// Index of the smallest level that is enough for so many unknowns, or of all directions.
+    pub fn smallest(&self, unknowns: usize) -> usize {
+        let enough = |part: &Level| part.columns.len() >= EACH * unknowns;
+        self.parts.iter().position(enough).unwrap_or(self.parts.len())
+    }
+
+    /// The smallest part of the directions that is enough for so many unknowns, if one is.
     pub fn part(&self, unknowns: usize) -> Option<&Level> {
-        Some(&self.part).filter(|part| part.columns.len() >= EACH * unknowns)
+        self.parts.get(self.smallest(unknowns))
     }
 }
