@@ -60,6 +60,27 @@ fn uneven_media_and_refracting_boundaries_agree_too() {
 }
 
 #[test]
+fn many_points_are_projected_in_blocks_as_few_are_at_once() {
+    let mesh = Object::Bird.place().unwrap().mesh;
+    let (low, high) = mesh.bounds();
+    let even = medium(&mesh, false).unwrap();
+    let spread = |i: u32| {
+        // Outside points have rows too.
+        let unit = DVec3::new(0.819_172_513, 0.671_043_606, 0.549_700_478) * f64::from(i);
+        low + (high - low) * unit.fract()
+    };
+    let points: Vec<DVec3> = (0..300_000).map(spread).collect();
+    let axis = DVec3::new(0.36, 0.48, 0.8);
+    let whole = project_with(&mesh, &even, None, &points, axis);
+    let parts: Vec<_> = points.chunks(50_000).map(|p| project_with(&mesh, &even, None, p, axis)).collect();
+    for side in 0..2 {
+        assert!(whole.lengths(side).iter().eq(parts.iter().flat_map(|p| p.lengths(side))));
+        assert!(whole.winding[side].iter().eq(parts.iter().flat_map(|p| &p.winding[side])));
+        assert!(whole.winding[side].contains(&1) && whole.winding[side].contains(&0));
+    }
+}
+
+#[test]
 fn bakes_by_either_method_err_alike() {
     let mesh = Object::Torus.place().unwrap().mesh;
     let even = medium(&mesh, false).unwrap();

@@ -13,7 +13,7 @@ pub use rays::{Depth, InsidePiece, depth_along, inside_pieces};
 pub use trace::trace;
 
 /// Depths of all points along one direction.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct DepthRows {
     /// m of each point along ω.
     pub forward: Vec<f32>,
@@ -31,11 +31,14 @@ impl DepthRows {
         if side == 0 { &self.forward } else { &self.backward }
     }
 
-    /// Adds the depths of more points.
-    fn append(&mut self, more: Self) {
-        self.forward.extend(more.forward);
-        self.backward.extend(more.backward);
-        self.boundary.iter_mut().zip(more.boundary).for_each(|(own, more)| own.extend(more));
-        self.winding.iter_mut().zip(more.winding).for_each(|(own, more)| own.extend(more));
+    /// No rows yet, with room for so many points; no boundary where it is index matched.
+    fn with_capacity(points: usize, matched: bool) -> Self {
+        let through = if matched { 0 } else { points };
+        Self {
+            forward: Vec::with_capacity(points),
+            backward: Vec::with_capacity(points),
+            boundary: [Vec::with_capacity(through), Vec::with_capacity(through)],
+            winding: [Vec::with_capacity(points), Vec::with_capacity(points)],
+        }
     }
 }

@@ -27,7 +27,9 @@ pub(super) struct Buckets {
 
 impl Buckets {
     pub fn new(points: &[DVec3], frame: &[DVec3; 3]) -> Self {
-        let projected: Vec<[f64; 3]> = points.iter().map(|p| frame.map(|axis| p.dot(axis))).collect();
+        let [u_axis, v_axis, z_axis] = *frame;
+        let projected: Vec<[f64; 3]> =
+            points.iter().map(|p| [p.dot(u_axis), p.dot(v_axis), p.dot(z_axis)]).collect();
         let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
         for p in &projected {
             for k in 0..2 {
@@ -87,12 +89,18 @@ impl Buckets {
         }))
     }
 
-    /// Values of the sorted points in the points' own order, each through `change`.
-    pub fn unsorted<T: Copy, U: Copy + Default>(&self, values: &[T], change: impl Fn(T) -> U) -> Vec<U> {
-        let mut out = vec![U::default(); self.order.len()];
+    /// Adds the values of the sorted points to `out`, in the points' own order, each through `change`.
+    pub fn unsorted<T: Copy, U: Copy + Default>(
+        &self,
+        values: &[T],
+        change: impl Fn(T) -> U,
+        out: &mut Vec<U>,
+    ) {
+        let from = out.len();
+        out.resize(from + self.order.len(), U::default());
+        let out = &mut out[from..];
         for (&i, &value) in self.order.iter().zip(values) {
             out[i as usize] = change(value);
         }
-        out
     }
 }

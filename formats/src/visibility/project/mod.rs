@@ -37,12 +37,12 @@ pub fn project_with(
 ) -> DepthRows {
     let (u_axis, v_axis) = direction.any_orthonormal_pair();
     let frame = [u_axis, v_axis, direction];
-    let corners: Vec<[f64; 3]> = mesh.positions.iter().map(|p| frame.map(|axis| p.dot(axis))).collect();
+    let corners = mesh.positions.iter().map(|p| [p.dot(u_axis), p.dot(v_axis), p.dot(direction)]).collect();
     let running = sampled.map(|s| s.running(direction));
     let projected = Projected { mesh, medium, frame, corners, running: running.as_ref() };
-    let mut blocks = points.chunks(BLOCK.max(mesh.triangles.len() / TRIANGLES_PER_POINT));
-    let mut rows = blocks.next().map(|block| projected.depths(block)).unwrap_or_default();
-    blocks.for_each(|block| rows.append(projected.depths(block)));
+    let blocks = points.chunks(BLOCK.max(mesh.triangles.len() / TRIANGLES_PER_POINT));
+    let mut rows = DepthRows::with_capacity(points.len(), medium.ior() == 1.0);
+    blocks.for_each(|block| projected.add_depths(block, &mut rows));
     rows
 }
 
@@ -64,7 +64,8 @@ struct Projected<'a> {
 }
 
 impl Projected<'_> {
-    fn depths(&self, points: &[DVec3]) -> DepthRows {
+    /// Adds the depths of `points` to `rows`.
+    fn add_depths(&self, points: &[DVec3], rows: &mut DepthRows) {
         let (mesh, medium) = (self.mesh, self.medium);
         let buckets = &Buckets::new(points, &self.frame);
         let corners = &self.corners[..];
@@ -86,12 +87,13 @@ impl Projected<'_> {
             (sums, boundary) = (visit.sums, visit.boundary);
         }
         let length = |m: f64| (m * scale).max(0.0) as f32;
-        let [forward, backward] = sums.depth.map(|values| buckets.unsorted(&values, length));
-        DepthRows {
-            forward,
-            backward,
-            boundary: boundary.map(|values| if matched { values } else { buckets.unsorted(&values, |t| t) }),
-            winding: [0, 1].map(|side| buckets.unsorted(&sums.windings, |w| windings(w)[side])),
+        buckets.unsorted(&sums.depth[0], length, &mut rows.forward);
+        buckets.unsorted(&sums.depth[1], length, &mut rows.backward);
+        for side in 0..2 {
+            buckets.unsorted(&sums.windings, |w| windings(w)[side], &mut rows.winding[side]);
+            if !matched {
+                buckets.unsorted(&boundary[side], |t| t, &mut rows.boundary[side]);
+            }
         }
     }
 }
