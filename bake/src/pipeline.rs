@@ -130,20 +130,19 @@ impl<'a> Pipeline<'a> {
     }
 
     fn shape(&self) -> Result<&Shape<'a>> {
-        if self.shape.get().is_none() {
-            let made = self.timed.stage("mesh", |_| Ok(Shape::new(self.input.mesh, self.params)))?;
-            return Ok(self.shape.get_or_init(|| made));
+        if let Some(shape) = self.shape.get() {
+            return Ok(shape);
         }
-        self.shape.get().ok_or_else(no_light)
+        let made = self.timed.stage("mesh", |_| Ok(Shape::new(self.input.mesh, self.params)))?;
+        Ok(self.shape.get_or_init(|| made))
     }
 
     fn medium(&self) -> Result<&Prepared<'a>> {
-        if self.medium.get().is_none() {
-            let made =
-                self.timed.stage("medium", |_| Ok(Prepared::new(self.input.medium, self.input.mesh)))?;
-            return Ok(self.medium.get_or_init(|| made));
+        if let Some(medium) = self.medium.get() {
+            return Ok(medium);
         }
-        self.medium.get().ok_or_else(no_light)
+        let made = self.timed.stage("medium", |_| Ok(Prepared::new(self.input.medium, self.input.mesh)))?;
+        Ok(self.medium.get_or_init(|| made))
     }
 
     fn method(&self, samples: usize) -> crate::params::Visibility {
@@ -229,7 +228,8 @@ impl<'a> Pipeline<'a> {
             offset.extend(lit.offset);
             arriving.iter_mut().zip(lit.held_out).for_each(|(all, own)| all.extend(own));
         }
-        let all = all.filter(|_| !offset.is_empty()).ok_or_else(no_light)?;
+        let lit = all.filter(|_| !offset.is_empty());
+        let all = lit.ok_or_else(|| Error::NoRoom("no light reaches its inside".to_owned()))?;
         let light = timed.stage("rounding", |p| fit::quantised(all, params, p))?;
         Ok(Lighting { keep, light, offset, exact: arriving, buried, dark })
     }
@@ -243,8 +243,4 @@ impl<'a> Pipeline<'a> {
 
 fn kept(samples: &[Candidate], keep: &[bool]) -> Vec<Candidate> {
     samples.iter().zip(keep).filter(|(_, keep)| **keep).map(|(s, _)| *s).collect()
-}
-
-fn no_light() -> Error {
-    Error::NoRoom("no light reaches its inside".to_owned())
 }

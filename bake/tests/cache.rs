@@ -114,6 +114,40 @@ fn an_interrupted_bake_goes_on_where_it_stopped() {
 }
 
 #[test]
+fn blocks_are_found_again_one_by_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let medium = medium(0.8, 5.0);
+    let params = |cache| Params {
+        samples: 70_000,
+        directions: 16,
+        points_per_sample: 1,
+        order: 2,
+        extra_bands: 0,
+        certificate: false,
+        ..small(cache)
+    };
+    let (whole, report) = run(&medium, &params(Some(folder.path())), &Silent).unwrap();
+    let two = ["optical depth", "harmonics", "optical depth", "harmonics"];
+    assert_eq!(report.cache.unwrap().kept[2..6], two);
+    let mut harmonics = 0;
+    for entry in std::fs::read_dir(folder.path()).unwrap() {
+        let entry = entry.unwrap();
+        let name = entry.file_name().to_string_lossy().into_owned();
+        let first_fits = name.starts_with("harmonics") && harmonics == 0;
+        harmonics += usize::from(first_fits);
+        if first_fits || name.starts_with("light") || name.starts_with("weights") {
+            std::fs::remove_file(entry.path()).unwrap();
+        }
+    }
+    let (again, report) = run(&medium, &params(Some(folder.path())), &Silent).unwrap();
+    assert!(again == whole);
+    let cache = report.cache.unwrap();
+    let count = |stage: &str| cache.reused.iter().filter(|s| *s == stage).count();
+    assert_eq!((count("samples"), count("optical depth"), count("harmonics")), (1, 2, 1));
+    assert_eq!(cache.kept, ["harmonics", "light", "weights"]);
+}
+
+#[test]
 fn damaged_entries_are_made_again_and_said_so() {
     let folder = tempfile::tempdir().unwrap();
     let medium = medium(0.8, 5.0);
