@@ -89,10 +89,12 @@ impl Projected<'_> {
         let length = |m: f64| (m * scale).max(0.0) as f32;
         buckets.unsorted(&sums.depth[0], length, &mut rows.forward);
         buckets.unsorted(&sums.depth[1], length, &mut rows.backward);
-        for side in 0..2 {
-            buckets.unsorted(&sums.windings, |w| windings(w)[side], &mut rows.winding[side]);
-            if !matched {
-                buckets.unsorted(&boundary[side], |t| t, &mut rows.boundary[side]);
+        for (side, rows) in rows.winding.iter_mut().enumerate() {
+            buckets.unsorted(&sums.windings, |w| windings(w)[side], rows);
+        }
+        if !matched {
+            for (through, rows) in boundary.iter().zip(&mut rows.boundary) {
+                buckets.unsorted(through, |t| t, rows);
             }
         }
     }
