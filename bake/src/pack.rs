@@ -27,7 +27,7 @@ pub(crate) fn pack(
     weight: Vec<f32>,
 ) -> Result<Asset> {
     let (low, high) = input.mesh.bounds();
-    let centre = 0.5 * (low + high);
+    let centre = input.mesh.centre();
     let local = |p: DVec3| (p - centre).as_vec3().to_array();
     let medium = input.medium;
     let position_radius = placed

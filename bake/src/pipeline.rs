@@ -10,7 +10,7 @@ use crate::field::{DistanceGrid, Shape, grid_cells};
 use crate::fit::{self, Fits, Light, Lit};
 use crate::measure::exact::means;
 use crate::pack::{self, Stand};
-use crate::params::Params;
+use crate::params::{DENSITY_DIRECTIONS, Params, Visibility};
 use crate::progress::Timed;
 use crate::refine::{self, Bench};
 use crate::report::{Facts, Refinement, Report};
@@ -66,18 +66,18 @@ struct Keys {
 }
 
 impl Keys {
-    fn new(input: &Input<'_>, params: &Params) -> Self {
+    fn new(input: &Input<'_>, params: &Params) -> Result<Self> {
         let p = params;
         let object = (input.mesh.content_hash(), input.medium.optical_hash());
-        let density = p.directions.min(crate::params::DENSITY_DIRECTIONS);
+        let density = p.directions.min(DENSITY_DIRECTIONS);
         let placing = (object, p.samples, p.seed, p.placement, p.visibility, density, p.width_factor);
-        // Refinement looks at the boundary's bands too.
-        let refined = (p.refine > 0).then_some((p.refine, p.order.min(6)));
-        let placing = Key::new("samples", &(placing, refined));
+        let boundary = fit::boundary_order(input.medium.ior(), p.order);
+        let refined = (p.refine > 0).then_some((p.refine, boundary));
+        let placing = Key::new("samples", &(placing, refined))?;
         let depths = (&placing, p.directions, p.points_per_sample, p.visibility, p.certificate);
-        let depths = Key::new("optical depth", &depths);
+        let depths = Key::new("optical depth", &depths)?;
         let light = (&depths, p.order, p.extra_bands, p.light_error, p.representation);
-        Self { lighting: Key::new("light", &light), placing, depths }
+        Ok(Self { lighting: Key::new("light", &light)?, placing, depths })
     }
 }
 
@@ -88,17 +88,16 @@ impl<'a> Pipeline<'a> {
 
     /// Runs what no cache holds.
     pub fn run(&self) -> Result<(Asset, Report)> {
-        let keys = Keys::new(self.input, self.params);
+        let keys = Keys::new(self.input, self.params)?;
         let placing = self.cache.get(&keys.placing, || self.place())?;
         let params = Params { width_factor: placing.width_factor, ..self.params.clone() };
         let placed = &placing.placed;
         let lighting = self.cache.get(&keys.lighting, || self.light(&keys, &placed.samples))?;
         let samples: Vec<Candidate> = kept(&placed.samples, &lighting.keep);
         let discarded = placed.samples.len() - samples.len();
-        let weights = Key::new("weights", &(&keys.depths, placing.width_factor));
+        let weights = Key::new("weights", &(&keys.depths, placing.width_factor))?;
         let weights = self.cache.get(&weights, || {
-            let (low, high) = self.input.mesh.bounds();
-            let middle = 0.5 * (low + high);
+            let middle = self.input.mesh.centre();
             self.timed
                 .stage("weights", |p| fit::weights(&samples, middle, &placed.probes, params.width_factor, p))
         })?;
@@ -109,7 +108,7 @@ impl<'a> Pipeline<'a> {
             pack::pack(self.input, sampled, &params, stand, light, weights)
         })?;
         if params.certificate {
-            let key = Key::new("certificate", &(&keys.lighting, placing.width_factor));
+            let key = Key::new("certificate", &(&keys.lighting, placing.width_factor))?;
             let measured = self.cache.get(&key, || self.measure(&exact, &asset))?;
             asset.info.certificate = Some(measured.certificate(self.input.medium));
         }
@@ -145,7 +144,7 @@ impl<'a> Pipeline<'a> {
         Ok(self.medium.get_or_init(|| made))
     }
 
-    fn method(&self, samples: usize) -> crate::params::Visibility {
+    fn method(&self, samples: usize) -> Visibility {
         fit::method(self.params, samples, self.input.mesh.triangles.len())
     }
 
@@ -153,7 +152,7 @@ impl<'a> Pipeline<'a> {
         let (params, timed) = (self.params, self.timed);
         let (shape, medium) = (self.shape()?, self.medium()?);
         let cells = grid_cells(shape.mesh, params.samples);
-        let key = Key::new("distance field", &(shape.mesh.content_hash(), cells));
+        let key = Key::new("distance field", &(shape.mesh.content_hash(), cells))?;
         let grid =
             self.cache.get(&key, || timed.stage("distance field", |p| DistanceGrid::new(shape, cells, p)))?;
         let skipped = grid.skipped;
@@ -189,7 +188,7 @@ impl<'a> Pipeline<'a> {
         for (b, range) in ranges.iter().enumerate() {
             let own = &samples[range.clone()];
             let block = (b, ranges.len());
-            let key = Key::new(keys.depths.stage(), &(&keys.depths, block));
+            let key = Key::new(keys.depths.stage(), &(&keys.depths, block))?;
             let lit: Lit = self.cache.get(&key, || {
                 let (shape, medium) = (self.shape()?, self.medium()?);
                 let task = timed.stage("cells", |_| fit::Task::new(shape, medium, own, b, params))?;
@@ -216,7 +215,7 @@ impl<'a> Pipeline<'a> {
             // The light of a single block is kept as a whole.
             let fits = match ranges.len() {
                 1 => make()?,
-                _ => self.cache.get(&Key::new("harmonics", &(&keys.lighting, block)), make)?,
+                _ => self.cache.get(&Key::new("harmonics", &(&keys.lighting, block))?, make)?,
             };
             match &mut all {
                 Some(all) => all.append(fits),

@@ -1,5 +1,6 @@
 //! What a result depends on, in one hash.
 
+use crate::{Error, Result};
 use serde::Serialize;
 
 /// Hash of the sources of this program: another version makes other results. The build script sets it.
@@ -14,16 +15,13 @@ pub(crate) struct Key {
 
 impl Key {
     /// For a stage whose result depends on `inputs`, among them the keys of results that it uses, and nothing else.
-    pub fn new(stage: &'static str, inputs: &impl Serialize) -> Self {
-        let mut hasher = blake3::Hasher::new();
-        // Writing to a hasher cannot fail; a value that cannot be encoded leaves the hash of what came before it, and the
-        // result of every other such value would be taken for its own: so it is marked by what is wrong with it.
-        let encoded = bincode::serde::encode_to_vec((CODE, stage, inputs), bincode::config::legacy());
-        match encoded {
-            Ok(bytes) => hasher.update(&bytes),
-            Err(e) => hasher.update(e.to_string().as_bytes()),
-        };
-        Self { stage, hash: *hasher.finalize().as_bytes() }
+    ///
+    /// # Errors
+    /// Inputs that cannot be encoded.
+    pub fn new(stage: &'static str, inputs: &impl Serialize) -> Result<Self> {
+        let bytes = bincode::serde::encode_to_vec((CODE, stage, inputs), bincode::config::legacy())
+            .map_err(|e| Error::Parameter(format!("the inputs of '{stage}' cannot be encoded: {e}")))?;
+        Ok(Self { stage, hash: *blake3::hash(&bytes).as_bytes() })
     }
 
     /// Whose result it is.
@@ -42,21 +40,25 @@ impl Key {
 mod tests {
     use super::*;
 
+    fn key(stage: &'static str, inputs: &impl Serialize) -> Key {
+        Key::new(stage, inputs).unwrap()
+    }
+
     #[test]
     fn every_input_counts() {
         let names = [
-            Key::new("a", &(1, 2.0)),
-            Key::new("b", &(1, 2.0)),
-            Key::new("a", &(1, 2.5)),
-            Key::new("a", &(2, 2.0)),
-            Key::new("a", &(Key::new("c", &1), 2.0)),
-            Key::new("a", &(Key::new("c", &2), 2.0)),
+            key("a", &(1, 2.0)),
+            key("b", &(1, 2.0)),
+            key("a", &(1, 2.5)),
+            key("a", &(2, 2.0)),
+            key("a", &(key("c", &1), 2.0)),
+            key("a", &(key("c", &2), 2.0)),
         ]
         .map(|k| k.file_name());
         for (i, name) in names.iter().enumerate() {
             assert!(!names[..i].contains(name), "{name}");
         }
-        assert_eq!(Key::new("a b", &1).file_name(), Key::new("a b", &1).file_name());
-        assert!(Key::new("a b", &1).file_name().starts_with("a-b-"));
+        assert_eq!(key("a b", &1).file_name(), key("a b", &1).file_name());
+        assert!(key("a b", &1).file_name().starts_with("a-b-"));
     }
 }

@@ -125,10 +125,10 @@ mod tests {
     fn results_are_made_once() {
         let folder = tempfile::tempdir().unwrap();
         let cache = Cache::open(Some(&folder.path().join("new"))).unwrap();
-        let key = Key::new("numbers", &1);
+        let key = Key::new("numbers", &1).unwrap();
         assert_eq!((get(&cache, &key, 5), get(&cache, &key, 6)), (5, 5));
-        assert_eq!(get(&cache, &Key::new("numbers", &2), 7), 7);
-        assert_eq!(get(&cache, &Key::new("others", &1), 8), 8);
+        assert_eq!(get(&cache, &Key::new("numbers", &2).unwrap(), 7), 7);
+        assert_eq!(get(&cache, &Key::new("others", &1).unwrap(), 8), 8);
         let report = cache.report().unwrap();
         assert_eq!(report.reused, ["numbers"]);
         assert_eq!(report.kept, ["numbers", "numbers", "others"]);
@@ -141,7 +141,7 @@ mod tests {
     #[test]
     fn damaged_files_are_made_again_and_said_so() {
         let folder = tempfile::tempdir().unwrap();
-        let key = Key::new("numbers", &1);
+        let key = Key::new("numbers", &1).unwrap();
         let path = folder.path().join(key.file_name());
         let whole = {
             get(&Cache::open(Some(folder.path())).unwrap(), &key, 5);
@@ -163,7 +163,7 @@ mod tests {
     #[test]
     fn a_folder_that_takes_no_files_does_not_stop_a_bake() {
         let folder = tempfile::tempdir().unwrap();
-        let key = Key::new("numbers", &1);
+        let key = Key::new("numbers", &1).unwrap();
         // A folder stands where the file should be.
         std::fs::create_dir(folder.path().join(key.file_name())).unwrap();
         let cache = Cache::open(Some(folder.path())).unwrap();

@@ -70,8 +70,7 @@ impl Trial {
         let near = nearest(bench.shape, &placed.samples, f64::from(CELL_RADIUS));
         let buried = buried(&placed.samples, &near);
         let cells = Cells::new(bench.shape, medium, &placed.samples, &buried, POINTS, seed)?;
-        let (low, high) = bench.shape.mesh.bounds();
-        let middle = 0.5 * (low + high);
+        let middle = bench.shape.mesh.centre();
         let weight = weights(&placed.samples, middle, &placed.probes, width_factor, stage)?;
         let params = &crate::params::Params { width_factor, ..bench.params.clone() };
         let offset = cells.offsets(&placed.samples);

@@ -84,7 +84,7 @@ pub(crate) fn place(
     let samples = blocks::arrange(samples, low, high);
     let inside = offered.list.iter().take(PROBES_PER_SAMPLE * samples.len());
     let probes: Vec<&Candidate> = inside.chain(offered.surface.iter().step_by(2)).collect();
-    let middle = 0.5 * (low + high);
+    let middle = shape.mesh.centre();
     let probe = |i: u32| {
         let c = probes[i as usize];
         Probe { position: (c.position - middle).as_vec3(), fluence: c.fluence as f32 }
@@ -97,7 +97,7 @@ pub(crate) fn place(
 /// Moves samples close to the boundary onto it, just inside, and rounds all positions to what the asset stores.
 fn snap_to_boundary(shape: &Shape<'_>, snap: f64, samples: &mut [Candidate]) -> usize {
     let (low, high) = shape.mesh.bounds();
-    let centre = 0.5 * (low + high);
+    let centre = shape.mesh.centre();
     let places = Places::new([low, high].map(|p| (p - centre).as_vec3().to_array()));
     let margin = 1e-5 * shape.diagonal;
     samples

@@ -75,6 +75,12 @@ impl Mesh {
         self.positions.iter().fold((first, first), |(low, high), p| (low.min(*p), high.max(*p)))
     }
 
+    /// Middle of the bounding box.
+    pub fn centre(&self) -> DVec3 {
+        let (low, high) = self.bounds();
+        0.5 * (low + high)
+    }
+
     /// Length of the bounding box's diagonal.
     pub fn diagonal(&self) -> f64 {
         let (low, high) = self.bounds();
