@@ -7,7 +7,7 @@
 use crate::cache::{Cache, Key};
 use crate::certificate::{self, Measured};
 use crate::field::{DistanceGrid, Shape, grid_cells};
-use crate::fit::{self, Fits, Light, Lit};
+use crate::fit::{self, FirstFits, Fits, Light, Lit};
 use crate::measure::exact::means;
 use crate::pack::{self, Stand};
 use crate::params::{DENSITY_DIRECTIONS, Params, Visibility};
@@ -62,6 +62,8 @@ struct Keys {
     placing: Key,
     /// Optical depths of all blocks.
     depths: Key,
+    /// First fits of all blocks.
+    first: Key,
     lighting: Key,
 }
 
@@ -76,8 +78,10 @@ impl Keys {
         let placing = Key::new("samples", &(placing, refined))?;
         let depths = (&placing, p.directions, p.points_per_sample, p.visibility, p.certificate);
         let depths = Key::new("optical depth", &depths)?;
-        let light = (&depths, p.order, p.extra_bands, p.light_error, p.representation);
-        Ok(Self { lighting: Key::new("light", &light)?, placing, depths })
+        let first = (&depths, fit::first_order(p), p.light_error, p.representation);
+        let first = Key::new("harmonics", &first)?;
+        let lighting = Key::new("light", &(&first, p.order, p.extra_bands))?;
+        Ok(Self { placing, depths, first, lighting })
     }
 }
 
@@ -205,17 +209,19 @@ impl<'a> Pipeline<'a> {
                 }
                 Ok(lit)
             })?;
-            let mut make = || {
-                let encoding = all.as_ref().map(|fits| fits.encoding);
-                if !std::mem::replace(&mut fits_announced, true) {
-                    timed.announce("harmonics", samples.len() - range.start);
-                }
-                timed.stage("harmonics", |p| fit::fits(&lit, encoding, params, p))
-            };
+            let first: FirstFits =
+                self.cache.get(&Key::new(keys.first.stage(), &(&keys.first, block))?, || {
+                    let encoding = all.as_ref().map(|fits| fits.encoding);
+                    if !std::mem::replace(&mut fits_announced, true) {
+                        timed.announce("harmonics", samples.len() - range.start);
+                    }
+                    timed.stage("harmonics", |p| fit::first_fits(&lit, encoding, params, p))
+                })?;
+            let make = || timed.stage("more bands", |p| fit::fits(&lit, first, params, p));
             // The light of a single block is kept as a whole.
             let fits = match ranges.len() {
                 1 => make()?,
-                _ => self.cache.get(&Key::new("harmonics", &(&keys.lighting, block))?, make)?,
+                _ => self.cache.get(&Key::new("more bands", &(&keys.lighting, block))?, make)?,
             };
             match &mut all {
                 Some(all) => all.append(fits),

@@ -58,7 +58,8 @@ fn with_cache(
     (cache.reused, cache.kept)
 }
 
-const ALL: [&str; 6] = ["distance field", "samples", "optical depth", "light", "weights", "certificate"];
+const ALL: [&str; 7] =
+    ["distance field", "samples", "optical depth", "harmonics", "light", "weights", "certificate"];
 
 #[test]
 fn only_what_depends_on_a_change_is_made_again() {
@@ -76,7 +77,15 @@ fn only_what_depends_on_a_change_is_made_again() {
     }
     let (reused, kept) = run(0.8, 5.0, &|p| Params { order: 3, ..p });
     assert_eq!(reused, ["samples", "optical depth", "weights"]);
-    assert_eq!(kept, ["light", "certificate"]);
+    assert_eq!(kept, ["harmonics", "light", "certificate"]);
+    // Beyond ten bands fits go on from ten.
+    let ten = run(0.8, 5.0, &|p| Params { order: 10, ..p });
+    assert_eq!(ten.1, ["harmonics", "light", "certificate"]);
+    for order in [11, 13] {
+        let (reused, kept) = run(0.8, 5.0, &|p| Params { order, ..p });
+        assert_eq!(reused, ["samples", "optical depth", "harmonics", "weights"]);
+        assert_eq!(kept, ["light", "certificate"]);
+    }
     let (reused, _) = run(0.8, 6.0, &same);
     assert_eq!(reused, ["distance field"]);
     for change in
@@ -110,7 +119,7 @@ fn an_interrupted_bake_goes_on_where_it_stopped() {
     assert!(matches!(stopped, Err(Error::Cancelled)));
     let (reused, kept) = with_cache(folder.path(), &medium, |p| p);
     assert_eq!(reused, ["samples", "optical depth"]);
-    assert_eq!(kept, ["light", "weights", "certificate"]);
+    assert_eq!(kept, ["harmonics", "light", "weights", "certificate"]);
 }
 
 #[test]
@@ -127,14 +136,14 @@ fn blocks_are_found_again_one_by_one() {
         ..small(cache)
     };
     let (whole, report) = run(&medium, &params(Some(folder.path())), &Silent).unwrap();
-    let two = ["optical depth", "harmonics", "optical depth", "harmonics"];
-    assert_eq!(report.cache.unwrap().kept[2..6], two);
-    let mut harmonics = 0;
+    let block = ["optical depth", "harmonics", "more bands"];
+    assert_eq!(report.cache.unwrap().kept[2..8], [block, block].concat());
+    let mut fits = 0;
     for entry in std::fs::read_dir(folder.path()).unwrap() {
         let entry = entry.unwrap();
         let name = entry.file_name().to_string_lossy().into_owned();
-        let first_fits = name.starts_with("harmonics") && harmonics == 0;
-        harmonics += usize::from(first_fits);
+        let first_fits = name.starts_with("more-bands") && fits == 0;
+        fits += usize::from(first_fits);
         if first_fits || name.starts_with("light") || name.starts_with("weights") {
             std::fs::remove_file(entry.path()).unwrap();
         }
@@ -143,8 +152,8 @@ fn blocks_are_found_again_one_by_one() {
     assert!(again == whole);
     let cache = report.cache.unwrap();
     let count = |stage: &str| cache.reused.iter().filter(|s| *s == stage).count();
-    assert_eq!((count("samples"), count("optical depth"), count("harmonics")), (1, 2, 1));
-    assert_eq!(cache.kept, ["harmonics", "light", "weights"]);
+    assert_eq!((count("optical depth"), count("harmonics"), count("more bands")), (2, 2, 1));
+    assert_eq!(cache.kept, ["more bands", "light", "weights"]);
 }
 
 #[test]

@@ -25,7 +25,7 @@ fn bakes(c: &mut Criterion) {
 }
 
 /// Stages with the time that their bake's report tells.
-const STAGES: [&str; 11] = [
+const STAGES: [&str; 12] = [
     "mesh",
     "distance field",
     "density",
@@ -34,6 +34,7 @@ const STAGES: [&str; 11] = [
     "optical depth",
     "held-out light",
     "harmonics",
+    "more bands",
     "rounding",
     "weights",
     "certificate",

@@ -9,8 +9,9 @@ use ndarray::Array2;
 ///
 /// [`even_directions`]: diaphane_formats::directions::even_directions
 const PARTS: [usize; 2] = [3, 2];
-/// Directions of a part for each unknown, at least.
-const EACH: usize = 3;
+/// Directions of a part for each unknown, at least: where unknowns are fitted, and where they are known and rounded.
+const FITTED: f32 = 3.0;
+const ROUNDED: f32 = 2.5;
 
 /// Some of the directions, with the harmonics in them.
 pub(super) struct Level {
@@ -72,14 +73,19 @@ impl Levels {
         [a, b, &self.all]
     }
 
-    /// Index of the smallest level that is enough for so many unknowns, or of all directions.
-    pub fn smallest(&self, unknowns: usize) -> usize {
-        let enough = |part: &Level| part.columns.len() >= EACH * unknowns;
-        self.parts.iter().position(enough).unwrap_or(self.parts.len())
+    /// Index of the smallest level that is enough to round so many coefficients.
+    pub fn for_rounding(&self, unknowns: usize) -> usize {
+        self.smallest(ROUNDED * unknowns as f32)
     }
 
-    /// The smallest part of the directions that is enough for so many unknowns, if one is.
+    /// The smallest part of the directions that is enough to fit so many unknowns, if one is.
     pub fn part(&self, unknowns: usize) -> Option<&Level> {
-        self.parts.get(self.smallest(unknowns))
+        self.parts.get(self.smallest(FITTED * unknowns as f32))
+    }
+
+    /// Index of the smallest level of so many directions, or of all directions.
+    fn smallest(&self, directions: f32) -> usize {
+        let enough = |part: &Level| part.columns.len() as f32 >= directions;
+        self.parts.iter().position(enough).unwrap_or(self.parts.len())
     }
 }

@@ -101,7 +101,7 @@ pub fn measure(axis: Axis, size: &Size) -> anyhow::Result<Measured> {
 const PARTS: [(&str, &[&str]); 4] = [
     ("whole bake", &["total"]),
     ("optical depth", &["optical depth"]),
-    ("fits", &["harmonics", "rounding", "weights"]),
+    ("fits", &["harmonics", "more bands", "rounding", "weights"]),
     ("placing", &["mesh", "distance field", "layers", "density", "samples", "cells"]),
 ];
 
