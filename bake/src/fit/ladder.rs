@@ -38,7 +38,7 @@ const PASSING: Steps = Steps { in_part: None, in_all: 3 };
 /// Of the last order, from a coarse start.
 const FULL: Steps = Steps { in_part: Some([6, 3]), in_all: 8 };
 /// Of more bands, where fewer were fitted well.
-const ONWARDS: Steps = Steps { in_part: Some([2, 2]), in_all: 3 };
+const ONWARDS: Steps = Steps { in_part: Some([2, 2]), in_all: 2 };
 /// Lowest order that is tried.
 const LEAST_ORDER: usize = 2;
 /// Samples of one task.

@@ -85,6 +85,11 @@ impl Rounding {
         let Pairs { sum, difference, seen: [even, odd] } = pairs;
         let (sum, difference) = (&sum[..], &difference[..]);
         let mut now = x.to_vec();
+        let curvature = |k: usize| {
+            let b = self.column(k);
+            sum!(|b, sum| b * b * sum)
+        };
+        let curvatures: Vec<f32> = (0..x.len()).map(curvature).collect();
         for _ in 0..SWEEPS {
             let mut changed = false;
             for k in (0..x.len()).rev() {
@@ -93,7 +98,7 @@ impl Rounding {
                 let (own, other) = if is_even { (&mut *even, &mut *odd) } else { (&mut *odd, &mut *even) };
                 let (own, other) = (&mut own[..], &mut other[..]);
                 let gradient = sum!(|b, own| b * own);
-                let curvature = sum!(|b, sum| b * b * sum);
+                let curvature = curvatures[k];
                 if !(curvature > 0.0) {
                     continue;
                 }
