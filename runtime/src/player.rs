@@ -4,7 +4,7 @@ use crate::cpu::CpuRenderer;
 use crate::edit::Edit;
 use crate::exact::{DepthTracer, ExactDepths};
 use crate::frame::Frame;
-use crate::gpu::GpuRenderer;
+use crate::gpu::{GpuRenderer, SplatPath};
 use crate::rendered::Rendered;
 use crate::{Error, Result};
 use diaphane_formats::asset::{Asset, Info};
@@ -59,7 +59,15 @@ impl Player {
     /// # Errors
     /// An asset that makes no sense; no GPU where one is demanded.
     pub fn new(asset: &Asset, backend: Backend) -> Result<Self> {
-        let (engine, note) = open(asset, backend)?;
+        Self::with_path(asset, backend, None)
+    }
+
+    /// As [`Self::new`]; on a GPU kernels are summed along `path`.
+    ///
+    /// # Errors
+    /// As [`Self::new`]; a path that the adapter cannot take.
+    pub fn with_path(asset: &Asset, backend: Backend, path: Option<SplatPath>) -> Result<Self> {
+        let (engine, note) = open(asset, backend, path)?;
         let tracer = DepthTracer::new(asset)?;
         Ok(Self {
             engine,
@@ -82,6 +90,14 @@ impl Player {
         match &self.engine {
             Engine::Cpu(_) => ("cpu", format!("{} threads", rayon::current_num_threads())),
             Engine::Gpu(gpu) => ("gpu", gpu.adapter().to_owned()),
+        }
+    }
+
+    /// How kernels are summed; `None` on the CPU.
+    pub fn path(&self) -> Option<SplatPath> {
+        match &self.engine {
+            Engine::Cpu(_) => None,
+            Engine::Gpu(gpu) => Some(gpu.path()),
         }
     }
 
@@ -157,9 +173,9 @@ impl Player {
     }
 }
 
-fn open(asset: &Asset, backend: Backend) -> Result<(Engine, Option<String>)> {
+fn open(asset: &Asset, backend: Backend, path: Option<SplatPath>) -> Result<(Engine, Option<String>)> {
     let cpu = || -> Result<Engine> { Ok(Engine::Cpu(Box::new(CpuRenderer::new(asset)?))) };
-    let gpu = || -> Result<Engine> { Ok(Engine::Gpu(Box::new(GpuRenderer::new(asset)?))) };
+    let gpu = || -> Result<Engine> { Ok(Engine::Gpu(Box::new(GpuRenderer::new(asset, path)?))) };
     match backend {
         Backend::Cpu => Ok((cpu()?, None)),
         Backend::Gpu => Ok((gpu()?, None)),

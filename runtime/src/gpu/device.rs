@@ -33,8 +33,9 @@ impl Faults {
     }
 }
 
-/// What every pass needs of an adapter.
-const NEEDED: Features = Features::FLOAT32_BLENDABLE;
+/// What is used where an adapter has it: splatting by quads, times of passes, lanes that talk.
+const WANTED: Features =
+    Features::FLOAT32_BLENDABLE.union(Features::TIMESTAMP_QUERY).union(Features::SUBGROUP);
 
 /// What a full adapter has and the simplest do not.
 const NEEDED_FLAGS: DownlevelFlags = DownlevelFlags::COMPUTE_SHADERS
@@ -69,7 +70,7 @@ impl GpuDevice {
     }
 
     fn request(adapter: Adapter) -> Result<Self> {
-        let required_features = NEEDED | (adapter.features() & Features::TIMESTAMP_QUERY);
+        let required_features = adapter.features() & WANTED;
         let name = adapter.get_info().name;
         let (device, queue) = pollster::block_on(adapter.request_device(&DeviceDescriptor {
             label: Some("diaphane"),
@@ -128,9 +129,6 @@ fn rank(kind: DeviceType) -> u32 {
 
 /// Why an adapter cannot be used.
 fn lacking(adapter: &Adapter, surface: Option<&Surface<'_>>) -> Option<&'static str> {
-    if !adapter.features().contains(NEEDED) {
-        return Some("cannot blend 32-bit floats");
-    }
     if !adapter.get_downlevel_capabilities().flags.contains(NEEDED_FLAGS) {
         return Some("cannot write storage buffers from all shaders");
     }

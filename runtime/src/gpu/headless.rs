@@ -1,7 +1,7 @@
 //! A renderer that owns its device and reads its pictures back.
 
 use super::device::{GpuDevice, instance};
-use super::pipeline::Pipeline;
+use super::pipeline::{Pipeline, SplatPath};
 use super::readback;
 use super::targets::Targets;
 use super::tiles::Tile;
@@ -26,13 +26,14 @@ pub struct GpuRenderer {
 }
 
 impl GpuRenderer {
-    /// Finds an adapter and uploads an asset.
+    /// Finds an adapter and uploads an asset. `path` says how kernels are summed; [`SplatPath::best`] if it does not.
     ///
     /// # Errors
     /// [`Error::NoAdapter`] without a usable adapter; an asset that makes no sense or does not fit.
-    pub fn new(asset: &Asset) -> Result<Self> {
+    pub fn new(asset: &Asset, path: Option<SplatPath>) -> Result<Self> {
         let owned = GpuDevice::open(&instance(), None)?;
-        let renderer = Pipeline::new(&owned.device, asset)?;
+        let path = path.unwrap_or_else(|| SplatPath::best(&owned.device));
+        let renderer = Pipeline::new(&owned.device, asset, path)?;
         owned.check()?;
         let timers = Timers::new(&owned.device, &owned.queue, 1);
         let name = owned.describe();
@@ -42,6 +43,11 @@ impl GpuRenderer {
     /// The adapter's name, backend, and whether it is software.
     pub fn adapter(&self) -> &str {
         &self.name
+    }
+
+    /// How kernels are summed.
+    pub fn path(&self) -> SplatPath {
+        self.renderer.path()
     }
 
     /// Bounds the memory that the state of a picture's pixels takes on the adapter, 512 MiB at first; pictures that

@@ -3,12 +3,13 @@
 //! ```text
 //! lighting                     once a frame: samples × lights -> source of every sample
 //! surface [boundary] segments  each sub-pixel ray: mesh -> sorted crossings -> up to four inside pieces
-//! [profile] splat resolve      each piece: kernels along it, summed and normalised -> picture
+//! [profile] gather             each piece: kernels along it, summed and normalised, tile by tile -> picture
+//!           or splat resolve   the same by blended quads ([`SplatPath`])
 //! ```
 //!
 //! [`GpuRenderer`] owns its device and reads pictures back; [`Renderer`] records the same passes into a host's command
 //! buffer, with two more for the screen: publish (mean of the rays so far) and display (exposure). Boundary runs where `ior` is not 1, profile where the medium has a density grid. Later pieces of rays are
-//! drawn indirectly and cost next to nothing where no ray has them. Sums are kept in 32-bit floats and blended in the
+//! drawn indirectly and cost next to nothing where no ray has them. Sums are kept in 32-bit floats and added in the
 //! order of the samples: the same adapter draws the same bits every time.
 
 mod bindings;
@@ -29,5 +30,6 @@ mod uniforms;
 
 pub use device::{GpuDevice, instance};
 pub use headless::GpuRenderer;
+pub use pipeline::SplatPath;
 pub use readback::texture as read_texture;
 pub use renderer::{Renderer, Request, Statistics};

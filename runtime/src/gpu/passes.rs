@@ -2,6 +2,7 @@
 
 pub(super) mod boundary;
 pub(super) mod display;
+pub(super) mod gather;
 pub(super) mod lighting;
 pub(super) mod profile;
 pub(super) mod publish;

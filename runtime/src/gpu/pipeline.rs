@@ -2,6 +2,7 @@
 
 use super::passes::Recorder;
 use super::passes::boundary::Boundary;
+use super::passes::gather::Gather;
 use super::passes::lighting::Lighting;
 use super::passes::profile::Profile;
 use super::passes::resolve::Resolve;
@@ -14,12 +15,12 @@ use super::targets::{TOTAL, Targets, budget};
 use super::tiles::{Tile, split};
 use super::timers::Timers;
 use super::uniforms::ViewUniform;
-use crate::Result;
 use crate::exact::ExactDepths;
 use crate::frame::Frame;
 use crate::rendered::MAX_PIECES;
+use crate::{Error, Result};
 use diaphane_formats::asset::{Asset, Info};
-use wgpu::{BindGroup, BindGroupLayout, CommandEncoder, Device, Queue};
+use wgpu::{BindGroup, BindGroupLayout, CommandEncoder, Device, Features, Queue};
 
 /// The passes, their buffers and their order.
 pub(super) struct Pipeline {
@@ -30,13 +31,43 @@ pub(super) struct Pipeline {
     boundary: Option<Boundary>,
     segments: Segments,
     profile: Option<Profile>,
-    splat: Splat,
-    resolve: Resolve,
+    splatting: Splatting,
     pub(super) asset: AssetBuffers,
     frame: FrameBuffers,
     targets: Option<(Targets, Groups)>,
     /// Bytes that the state of all pixels may take.
     pub(super) most_memory: u64,
+}
+
+/// How kernels are summed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SplatPath {
+    /// A quad for each kernel, blended into textures of f32: needs `FLOAT32_BLENDABLE`.
+    Quads,
+    /// Every tile of 8 × 8 pixels gathers its kernels in registers.
+    Tiles,
+}
+
+impl SplatPath {
+    /// The one that a device draws with unless it is told otherwise: tiles need no feature beyond those of every adapter and
+    /// were faster wherever both were measured.
+    pub fn best(_: &Device) -> Self {
+        Self::Tiles
+    }
+
+    /// "quads" or "tiles".
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Quads => "quads",
+            Self::Tiles => "tiles",
+        }
+    }
+}
+
+/// The passes of a [`SplatPath`].
+enum Splatting {
+    Quads(Splat, Resolve),
+    Tiles(Gather),
 }
 
 /// The groups of all passes.
@@ -51,8 +82,12 @@ struct Groups {
 
 struct PieceGroups {
     profile: Option<BindGroup>,
-    splat: BindGroup,
-    resolve: BindGroup,
+    splatting: SplattingGroups,
+}
+
+enum SplattingGroups {
+    Quads { splat: BindGroup, resolve: BindGroup },
+    Tiles(BindGroup),
 }
 
 impl Pipeline {
@@ -60,7 +95,10 @@ impl Pipeline {
     ///
     /// # Errors
     /// An asset that makes no sense or is too large for the device.
-    pub fn new(device: &Device, asset: &Asset) -> Result<Self> {
+    pub fn new(device: &Device, asset: &Asset, path: SplatPath) -> Result<Self> {
+        if path == SplatPath::Quads && !device.features().contains(Features::FLOAT32_BLENDABLE) {
+            return Err(Error::Gpu("the adapter cannot blend 32-bit floats, which quads need".to_owned()));
+        }
         let common = common_layout(device);
         let asset = AssetBuffers::new(device, asset)?;
         Ok(Self {
@@ -70,8 +108,13 @@ impl Pipeline {
             boundary: asset.fresnel.then(|| Boundary::new(device, &common)),
             segments: Segments::new(device, &common, &asset),
             profile: asset.heterogeneous.then(|| Profile::new(device, &common)),
-            splat: Splat::new(device, &common, &asset),
-            resolve: Resolve::new(device, &common, &asset),
+            splatting: match path {
+                SplatPath::Quads => Splatting::Quads(
+                    Splat::new(device, &common, &asset),
+                    Resolve::new(device, &common, &asset),
+                ),
+                SplatPath::Tiles => Splatting::Tiles(Gather::new(device, &common, &asset)),
+            },
             frame: FrameBuffers::new(device, &common, &asset),
             common,
             asset,
@@ -80,10 +123,22 @@ impl Pipeline {
         })
     }
 
+    /// How kernels are summed.
+    pub(super) fn path(&self) -> SplatPath {
+        match self.splatting {
+            Splatting::Quads(..) => SplatPath::Quads,
+            Splatting::Tiles(_) => SplatPath::Tiles,
+        }
+    }
+
     /// Takes extinction and albedo from an edited asset's parameters.
     pub(super) fn set_material(&mut self, device: &Device, queue: &Queue, info: &Info) {
         self.asset.set_material(queue, info);
-        self.splat.set_grey(device, self.asset.material.is_grey());
+        let variant = self.asset.variant();
+        match &mut self.splatting {
+            Splatting::Quads(splat, _) => splat.set_variant(device, variant),
+            Splatting::Tiles(gather) => gather.set_variant(device, variant),
+        }
     }
 
     /// Uploads a frame's lights, and sees that there are targets for its tiles, which it returns.
@@ -100,7 +155,7 @@ impl Pipeline {
         let fits = self.targets.as_ref().is_some_and(|(t, _)| t.size == tiles[0].size);
         if !fits || self.frame.take_changed() {
             let old = self.targets.take().map(|(t, _)| t).filter(|_| fits);
-            let targets = old.unwrap_or_else(|| Targets::new(device, &self.asset, tiles[0]));
+            let targets = old.unwrap_or_else(|| Targets::new(device, &self.asset, tiles[0], self.path()));
             let groups = self.groups(device, &targets);
             self.targets = Some((targets, groups));
         }
@@ -188,8 +243,16 @@ impl Pipeline {
             if let (Some(profile), Some(group)) = (&self.profile, &piece.profile) {
                 profile.record(r, group, targets, k);
             }
-            self.splat.record(r, &piece.splat, targets, k);
-            self.resolve.record(r, &piece.resolve, targets, k);
+            match (&self.splatting, &piece.splatting) {
+                (Splatting::Quads(quads, end), SplattingGroups::Quads { splat, resolve }) => {
+                    quads.record(r, splat, targets, k);
+                    end.record(r, resolve, targets, k);
+                }
+                (Splatting::Tiles(gather), SplattingGroups::Tiles(group)) => {
+                    gather.record(r, group, targets, k);
+                }
+                _ => {}
+            }
         }
     }
 
@@ -197,8 +260,13 @@ impl Pipeline {
         let (asset, frame) = (&self.asset, &self.frame);
         let piece = |k: usize| PieceGroups {
             profile: self.profile.as_ref().map(|p| p.bind(device, asset, targets, k)),
-            splat: self.splat.bind(device, asset, targets, k),
-            resolve: self.resolve.bind(device, targets, k),
+            splatting: match &self.splatting {
+                Splatting::Quads(splat, resolve) => SplattingGroups::Quads {
+                    splat: splat.bind(device, asset, targets, k),
+                    resolve: resolve.bind(device, targets, k),
+                },
+                Splatting::Tiles(gather) => SplattingGroups::Tiles(gather.bind(device, asset, targets, k)),
+            },
         };
         Groups {
             lighting: self.lighting.bind(device, asset, frame),

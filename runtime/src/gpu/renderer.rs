@@ -4,7 +4,7 @@
 use super::passes::Recorder;
 use super::passes::display::Display;
 use super::passes::publish::Publish;
-use super::pipeline::Pipeline;
+use super::pipeline::{Pipeline, SplatPath};
 use super::readback;
 use super::targets::SUM_FORMAT;
 use super::timers::{PASSES, Pass, Reading, Timers};
@@ -83,7 +83,7 @@ impl Renderer {
     /// # Errors
     /// An asset that makes no sense or is too large for the device.
     pub fn new(device: &Device, queue: &Queue, asset: &Asset, target: TextureFormat) -> Result<Self> {
-        let passes = Pipeline::new(device, asset)?;
+        let passes = Pipeline::new(device, asset, SplatPath::best(device))?;
         Ok(Self {
             publish: Publish::new(device, passes.common_layout()),
             display: Display::new(device, target),

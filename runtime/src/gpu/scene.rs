@@ -10,8 +10,10 @@ use crate::frame::Frame;
 use crate::usable::{density_at, usable_samples};
 use crate::{Error, Result};
 use diaphane_formats::asset::{Asset, Info};
+use diaphane_formats::hits::DENSE;
 use diaphane_formats::slopes::{NEIGHBOURS, Stencil};
 use diaphane_formats::{kernel, sh};
+use glam::Vec3;
 use wgpu::{BindGroup, BindGroupLayout, Buffer, BufferBinding, BufferUsages, Device, Queue, ShaderStages};
 
 /// Everything that stays as long as the asset does.
@@ -24,6 +26,8 @@ pub(super) struct AssetBuffers {
     pub neighbours: Buffer,
     pub normals: Buffer,
     pub samples: Buffer,
+    /// A sphere around every [`CLUSTER`] kernels that follow each other; radius 0 without any.
+    pub clusters: Buffer,
     pub weights: Buffer,
     pub depth: Buffer,
     pub boundary: Buffer,
@@ -41,6 +45,10 @@ pub(super) struct AssetBuffers {
     pub values: Buffer,
     /// Written by the slopes pass.
     pub sources: Buffer,
+    /// Of the grid; 1 without.
+    most_density: f32,
+    /// Of the widest kernel.
+    least_sharpness: f32,
     pub sample_count: u32,
     pub samples_drawn: u64,
     pub triangle_count: u32,
@@ -106,6 +114,7 @@ impl AssetBuffers {
             neighbours: filled_buffer(device, "neighbours", &neighbours(&asset.mesh_triangles), storage),
             normals: filled_buffer(device, "normals", normals.as_flattened(), storage),
             samples: filled_buffer(device, "samples", &kernels, storage),
+            clusters: filled_buffer(device, "clusters", &clusters(&kernels, &samples.weight), storage),
             weights: filled_buffer(device, "weights", &samples.weight, storage),
             depth: filled_buffer(device, "depth", &packed::words(&samples.depth), storage),
             boundary: filled_buffer(device, "boundary", &packed::words(&samples.boundary), storage),
@@ -117,6 +126,12 @@ impl AssetBuffers {
             spokes: filled_buffer(device, "spokes", &spokes, storage),
             values: empty_buffer(device, "values", 16 * kernels.len() as u64, storage),
             sources: empty_buffer(device, "sources", 64 * kernels.len() as u64, storage),
+            most_density: if grid.is_empty() {
+                1.0
+            } else {
+                grid.iter().map(|v| v[0].to_f32()).fold(0.0, f32::max)
+            },
+            least_sharpness: kernels.iter().map(|k| k[3]).fold(f32::INFINITY, f32::min),
             sample_count: kernels.len() as u32,
             samples_drawn: samples.weight.iter().filter(|w| **w > 0.0).count() as u64,
             triangle_count: asset.mesh_triangles.len() as u32,
@@ -140,12 +155,60 @@ impl AssetBuffers {
         queue.write_buffer(&self.medium, 0, bytemuck::bytes_of(&self.material));
     }
 
+    /// The code that the material needs.
+    pub fn variant(&self) -> Variant {
+        Variant {
+            grey: self.material.is_grey(),
+            dense: self.material.kappa.max_element() * self.most_density > DENSE * self.least_sharpness,
+            heterogeneous: self.heterogeneous,
+        }
+    }
+
     /// Columns and rows of workgroups with 64 threads that give each sample one.
     pub fn sample_groups(&self) -> [u32; 2] {
         const ROW: u32 = 1024;
         let groups = self.sample_count.div_ceil(64);
         [groups.min(ROW), groups.div_ceil(ROW)]
     }
+}
+
+/// What the code of a splat depends on; compiled anew where it changes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Variant {
+    /// All channels attenuate alike.
+    grey: bool,
+    /// The medium is too dense over some kernel for the fast form of its integral.
+    dense: bool,
+    heterogeneous: bool,
+}
+
+impl Variant {
+    /// As overrides of the shaders.
+    pub fn constants(self) -> [(&'static str, f64); 3] {
+        let number = |b: bool| f64::from(u8::from(b));
+        [
+            ("GREY", number(self.grey)),
+            ("DENSE", number(self.dense)),
+            ("HETEROGENEOUS", number(self.heterogeneous)),
+        ]
+    }
+}
+
+/// Samples of a cluster.
+const CLUSTER: usize = 64;
+
+/// Spheres around the supports of [`CLUSTER`] kernels each (position, sharpness), as far as they have weight.
+fn clusters(kernels: &[[f32; 4]], weights: &[f32]) -> Vec<[f32; 4]> {
+    let sphere = |(kernels, weights): (&[[f32; 4]], &[f32])| {
+        let drawn = || kernels.iter().zip(weights).filter(|(_, w)| **w > 0.0).map(|(k, _)| *k);
+        let centre = |k: [f32; 4]| Vec3::new(k[0], k[1], k[2]);
+        let low = drawn().map(centre).fold(Vec3::INFINITY, Vec3::min);
+        let high = drawn().map(centre).fold(Vec3::NEG_INFINITY, Vec3::max);
+        let middle = if low.is_finite() { 0.5 * (low + high) } else { Vec3::ZERO };
+        let reach = |k: [f32; 4]| middle.distance(centre(k)) + kernel::CUT_OFF_RADIUS / k[3];
+        middle.extend(drawn().map(reach).fold(0.0, f32::max)).to_array()
+    };
+    kernels.chunks(CLUSTER).zip(weights.chunks(CLUSTER)).map(sphere).collect()
 }
 
 /// Distance between two rays' uniforms: the largest alignment that an adapter may ask for.

@@ -14,10 +14,34 @@ pub(super) const PROFILE: &str = source!("shared/view", "shared/medium", "shared
 pub(super) const LIGHTING: &str =
     source!("shared/view", "shared/medium", "shared/light", "shared/phase", "shared/sh", "lighting");
 pub(super) const SLOPES: &str = source!("shared/view", "shared/medium", "slopes");
-pub(super) const SPLAT: &str =
-    source!("shared/view", "shared/medium", "shared/kernel", "shared/profile", "splat");
+pub(super) const SPLAT: &str = source!(
+    "shared/view",
+    "shared/medium",
+    "shared/kernel",
+    "shared/profile",
+    "shared/contribution",
+    "splat"
+);
 pub(super) const RESOLVE: &str =
-    source!("shared/view", "shared/medium", "shared/kernel", "shared/profile", "resolve");
+    source!("shared/view", "shared/medium", "shared/kernel", "shared/profile", "shared/emission", "resolve");
+macro_rules! gather {
+    ($end:literal) => {
+        source!(
+            "shared/view",
+            "shared/medium",
+            "shared/kernel",
+            "shared/profile",
+            "shared/contribution",
+            "shared/emission",
+            "gather",
+            $end
+        )
+    };
+}
+
+/// Where lanes of a subgroup can talk, and where they cannot.
+pub(super) const GATHER_BY_LANES: &str = gather!("gather_lanes");
+pub(super) const GATHER_PLAINLY: &str = gather!("gather_plain");
 
 pub(super) const PUBLISH: &str = source!("shared/view", "publish");
 pub(super) const DISPLAY: &str = source!("display");

@@ -1,6 +1,7 @@
 //! State of the pixels of one tile.
 
 use super::bindings::empty_buffer;
+use super::pipeline::SplatPath;
 use super::scene::AssetBuffers;
 use super::tiles::{Budget, Tile};
 use crate::rendered::MAX_PIECES;
@@ -14,8 +15,12 @@ use wgpu::{
 pub(super) const SUM_FORMAT: TextureFormat = TextureFormat::Rgba32Float;
 /// Format of the attachment that the surface pass does not write.
 pub(super) const MARKER_FORMAT: TextureFormat = TextureFormat::R8Unorm;
-/// Bytes of one piece's indirect arguments: a draw (four words), a dispatch (three), one unused.
-pub(super) const ARGUMENTS: u64 = 32;
+/// Bytes of one piece's indirect arguments: a draw (four words), a dispatch over cells of 8 × 8 pixels (three, one unused), one
+/// over tiles of 16 × 16.
+pub(super) const ARGUMENTS: u64 = 48;
+/// Where the dispatches are in them.
+pub(super) const OVER_CELLS: u64 = 16;
+pub(super) const OVER_TILES: u64 = 32;
 
 /// State of all pixels together stays below this, so that large pictures leave memory to others.
 pub(super) const TOTAL: u64 = 512 << 20;
@@ -65,7 +70,7 @@ pub(super) fn budget(device: &Device, asset: &AssetBuffers, total: u64) -> Budge
 
 impl Targets {
     /// Targets for tiles up to the size of `tile`.
-    pub fn new(device: &Device, asset: &AssetBuffers, tile: Tile) -> Self {
+    pub fn new(device: &Device, asset: &AssetBuffers, tile: Tile, path: SplatPath) -> Self {
         let pixels = tile.pixels();
         let stride = pixels.next_multiple_of(16);
         let cell_stride =
@@ -73,10 +78,12 @@ impl Targets {
         let state = BufferUsages::STORAGE | BufferUsages::COPY_DST;
         let read = state | BufferUsages::COPY_SRC;
         let buffer = |label: &str, size: u64, usage| empty_buffer(device, label, size, usage);
-        let texture = |label: &str, format| {
+        // Only quads are blended.
+        let blended = if path == SplatPath::Quads { tile.size } else { [1; 2] };
+        let texture = |label: &str, format, [width, height]: [u32; 2]| {
             let texture = device.create_texture(&TextureDescriptor {
                 label: Some(label),
-                size: Extent3d { width: tile.size[0], height: tile.size[1], depth_or_array_layers: 1 },
+                size: Extent3d { width, height, depth_or_array_layers: 1 },
                 mip_level_count: 1,
                 sample_count: 1,
                 dimension: TextureDimension::D2,
@@ -99,9 +106,9 @@ impl Targets {
             arguments: buffer("arguments", ARGUMENTS * MAX_PIECES as u64, state | BufferUsages::INDIRECT),
             cells: buffer("cells", CELL * MAX_PIECES as u64 * cell_stride, state),
             cell_stride,
-            marker: texture("marker", MARKER_FORMAT),
-            numerator: texture("numerator", SUM_FORMAT),
-            denominator: texture("denominator", SUM_FORMAT),
+            marker: texture("marker", MARKER_FORMAT, tile.size),
+            numerator: texture("numerator", SUM_FORMAT, blended),
+            denominator: texture("denominator", SUM_FORMAT, blended),
         }
     }
 

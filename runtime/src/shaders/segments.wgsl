@@ -7,7 +7,7 @@ const SLOTS: u32 = 8u;
 const STATE: u32 = 10u;
 const BOUNDARY: u32 = 12u;
 const MAX_PIECES: u32 = 4u;
-const ARGUMENTS: u32 = 8u; // draw (4), dispatch (3), unused
+const ARGUMENTS: u32 = 12u; // draw (4), dispatch over 8 x 8 pixels (3), unused, over 16 x 16 (3), unused
 
 @group(1) @binding(0) var<storage, read> crossings: array<u32>;
 @group(1) @binding(1) var<storage, read> boundary: array<f32>;
@@ -101,10 +101,14 @@ fn cut(index: u32) {
             pieces[k * stride + index] = vec4f(0.0);
         } else if (atomicLoad(&arguments[k * ARGUMENTS]) == 0u) {
             let groups = (view.tile_size + vec2u(7u)) / 8u;
+            let large = (view.tile_size + vec2u(15u)) / 16u;
             atomicMax(&arguments[k * ARGUMENTS + 1u], medium.samples);
             atomicMax(&arguments[k * ARGUMENTS + 4u], groups.x);
             atomicMax(&arguments[k * ARGUMENTS + 5u], groups.y);
             atomicMax(&arguments[k * ARGUMENTS + 6u], 1u);
+            atomicMax(&arguments[k * ARGUMENTS + 8u], large.x);
+            atomicMax(&arguments[k * ARGUMENTS + 9u], large.y);
+            atomicMax(&arguments[k * ARGUMENTS + 10u], 1u);
             atomicMax(&arguments[k * ARGUMENTS], 6u);
         }
     }

@@ -1,7 +1,5 @@
 // Splat pass: each sample's kernel, integrated in closed form along the part of every ray that lies in the current
 // inside piece, added up without sorting. Twin of `reconstruct::piece_radiance`.
-override GREY: bool = true;             // all channels have the same extinction
-override HETEROGENEOUS: bool = false;   // the medium has a density profile
 
 @group(1) @binding(0) var<storage, read> samples: array<vec4f>; // position, sharpness
 @group(1) @binding(1) var<storage, read> sources: array<vec4f>; // SOURCE a sample: v, weight; slopes
@@ -11,8 +9,6 @@ override HETEROGENEOUS: bool = false;   // the medium has a density profile
 @group(1) @binding(4) var<storage, read> cells: array<vec2f>;
 
 const SOURCE: u32 = 4u;
-const MOST_EXPONENT: f32 = 4.0;
-const PARTS: u32 = 4u;
 const CELL: u32 = 8u;
 const MOST_CELLS: u32 = 64u;
 
@@ -123,66 +119,14 @@ fn outline(@builtin(vertex_index) corner: u32, @builtin(instance_index) index: u
 fn add(in: Splat) -> Sums {
     let pixel = vec2u(in.position.xy);
     let index = pixel_index(pixel);
-    let whole = piece[index];
+    let whole = piece[index].xy;
     if (whole.y <= whole.x) {
         discard;
     }
-    let direction = ray_direction(pixel);
-    let a = in.centre.w;
-    let tc = dot(in.centre.xyz, direction);
-    let across = in.centre.xyz - direction * tc;
-    let d2 = dot(across, across);
-    let h2 = CUT_OFF / (a * a) - d2;
-    if (h2 <= 0.0) {
+    let kernel = Kernel(in.centre.xyz, in.centre.w, in.source, in.slope_r, in.slope_g, in.slope_b);
+    let sums = contribution(kernel, index, ray_direction(pixel), whole);
+    if (!sums.met) {
         discard;
     }
-    let h = sqrt(h2);
-    let ends = vec2f(max(whole.x, tc - h), min(whole.y, tc + h));
-    if (ends.x >= ends.y) {
-        discard;
-    }
-    let long = a * (whole.y - whole.x) >= LEAST_WIDTHS;
-    let rise = -vec3f(dot(in.slope_r, across), dot(in.slope_g, across), dot(in.slope_b, across));
-    let slope = vec3f(dot(in.slope_r, direction), dot(in.slope_g, direction), dot(in.slope_b, direction));
-    var numerator = vec3f(0.0);
-    var denominator = vec3f(0.0);
-    // Where the density varies, each part of the support has its own.
-    let parts = select(1u, PARTS, HETEROGENEOUS);
-    let size = (ends.y - ends.x) / f32(parts);
-    for (var part = 0u; part < parts; part++) {
-        let near = ends.x + f32(part) * size;
-        var path = Path(near - tc, size, near - whole.x, 1.0, 1.0);
-        var shift = 0.0;
-        if (HETEROGENEOUS) {
-            // Attenuation in front from the profile; inside the part it is taken as linear.
-            let first = profile_at(index, near - whole.x, whole.y - whole.x);
-            let last = profile_at(index, near + size - whole.x, whole.y - whole.x);
-            let change = last - first;
-            path.before = first.x;
-            path.density = change.x * (1.0 / size);
-            path.scattering = change.y * (1.0 / size);
-            // The closed form takes the density as even over the part; what is uneven moves the mean.
-            if (change.y > 0.0) {
-                let middle = near + 0.5 * size - whole.x;
-                shift = clamp(change.z / change.y - middle, -0.5 * size, 0.5 * size);
-            }
-        }
-        let red = kernel_weight(a, d2, path, medium.kappa.x, long);
-        var w = vec3f(red.x);
-        var mean = vec3f(red.y);
-        if (!GREY) {
-            let green = kernel_weight(a, d2, path, medium.kappa.y, long);
-            let blue = kernel_weight(a, d2, path, medium.kappa.z, long);
-            w = vec3f(red.x, green.x, blue.x);
-            mean = vec3f(red.y, green.y, blue.y);
-        }
-        mean = clamp(mean + shift, vec3f(path.s), vec3f(path.s + size));
-        w *= in.source.w;
-        // The source's mean under the weight: it grows exponentially from the kernel's centre.
-        let spread = min(0.25 / (a * a), size * size * (1.0 / 24.0));
-        let exponent = rise + slope * (mean + spread * slope);
-        numerator += in.source.xyz * exp(clamp(exponent, vec3f(-MOST_EXPONENT), vec3f(MOST_EXPONENT))) * w;
-        denominator += w;
-    }
-    return Sums(vec4f(numerator, 1.0), vec4f(denominator, 0.0));
+    return Sums(vec4f(sums.numerator, 1.0), vec4f(sums.denominator, 0.0));
 }

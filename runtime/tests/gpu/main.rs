@@ -12,7 +12,7 @@ use diaphane_runtime::Error;
 use diaphane_runtime::cpu::CpuRenderer;
 use diaphane_runtime::exact::{DepthTracer, ExactDepths};
 use diaphane_runtime::frame::Frame;
-use diaphane_runtime::gpu::{GpuDevice, GpuRenderer, Renderer, Request, instance};
+use diaphane_runtime::gpu::{GpuDevice, GpuRenderer, Renderer, Request, SplatPath, instance};
 use diaphane_runtime::rendered::RayResult;
 use objects::{Object, ball, torus, uneven_grid};
 use scenes::{inside, level, outside, scene};
@@ -20,7 +20,12 @@ use wgpu::TextureFormat;
 
 /// A renderer, or `None` after saying why.
 fn gpu(asset: &Asset) -> Option<GpuRenderer> {
-    match GpuRenderer::new(asset) {
+    gpu_with(asset, SplatPath::Tiles)
+}
+
+/// The same that sums kernels along `path`.
+fn gpu_with(asset: &Asset, path: SplatPath) -> Option<GpuRenderer> {
+    match GpuRenderer::new(asset, Some(path)) {
         Ok(gpu) => Some(gpu),
         Err(e @ Error::NoAdapter(_)) if std::env::var_os("DIAPHANE_REQUIRE_GPU").is_none_or(|v| v != "1") => {
             tell(&format!("skipped: no adapter ({e})"));
@@ -44,7 +49,13 @@ fn same_pieces(a: &RayResult, b: &RayResult, diagonal: f32) -> bool {
 /// One ray of every pixel on both backends: largest difference 1e-4 of the peak where the pieces agree to 1e-5
 /// diagonals, and they do on 99.5 % of the rays.
 fn compare_rays(name: &str, asset: &Asset, frame: &Frame, exact: Option<&ExactDepths>) {
-    let Some(mut gpu) = gpu(asset) else { return };
+    for path in [SplatPath::Quads, SplatPath::Tiles] {
+        compare_path(&format!("{name} by {}", path.name()), path, asset, frame, exact);
+    }
+}
+
+fn compare_path(name: &str, path: SplatPath, asset: &Asset, frame: &Frame, exact: Option<&ExactDepths>) {
+    let Some(mut gpu) = gpu_with(asset, path) else { return };
     let cpu = CpuRenderer::new(asset).unwrap();
     let sources = cpu.sources(frame, exact);
     let (mut rays, mut agreeing, mut hits) = (0usize, 0usize, 0usize);

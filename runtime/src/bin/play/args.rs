@@ -2,6 +2,7 @@
 
 use clap::{Parser, ValueEnum};
 use diaphane_runtime::edit::{Edit, parse_channels};
+use diaphane_runtime::gpu::SplatPath;
 use diaphane_runtime::player::{Backend, LightMode};
 use glam::DVec3;
 use std::path::PathBuf;
@@ -37,6 +38,9 @@ pub struct Args {
     /// What draws
     #[arg(long, value_enum, default_value_t = BackendArg::Auto)]
     pub backend: BackendArg,
+    /// How a GPU sums the kernels
+    #[arg(long, value_enum, default_value_t = SplatArg::Auto, requires = "output")]
+    pub splat: SplatArg,
     /// Depth from the samples to the lights: baked, exact (rays to every light of the scene) or auto (rays to lights
     /// inside the object's bounding box). Headless default: baked; in the window: auto
     #[arg(long, value_enum)]
@@ -87,6 +91,27 @@ impl From<BackendArg> for Backend {
             BackendArg::Auto => Self::Auto,
             BackendArg::Gpu => Self::Gpu,
             BackendArg::Cpu => Self::Cpu,
+        }
+    }
+}
+
+/// [`SplatPath`] on the command line.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub enum SplatArg {
+    /// Whichever suits the adapter
+    Auto,
+    /// Quads, blended
+    Quads,
+    /// Tiles that gather in registers
+    Tiles,
+}
+
+impl From<SplatArg> for Option<SplatPath> {
+    fn from(arg: SplatArg) -> Self {
+        match arg {
+            SplatArg::Auto => None,
+            SplatArg::Quads => Some(SplatPath::Quads),
+            SplatArg::Tiles => Some(SplatPath::Tiles),
         }
     }
 }

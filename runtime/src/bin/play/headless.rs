@@ -32,7 +32,7 @@ pub fn run(args: &Args, output: &Path) -> Result<()> {
     let frame = Frame::new(&scene, &asset.info)?;
     let mode: LightMode = args.light.map_or(LightMode::Baked, Into::into);
     warn(&frame, &asset.info, mode);
-    let mut player = Player::new(&asset, args.backend.into())?;
+    let mut player = Player::with_path(&asset, args.backend.into(), args.splat.into())?;
     if let Some(note) = player.note() {
         eprintln!("note: {note}");
     }

@@ -3,6 +3,7 @@
 use anyhow::Result;
 use diaphane_formats::files;
 use diaphane_runtime::frame::Frame;
+use diaphane_runtime::gpu::SplatPath;
 use diaphane_runtime::player::Player;
 use diaphane_runtime::rendered::{Counters, Rendered};
 use serde::Serialize;
@@ -14,6 +15,8 @@ use std::path::Path;
 pub struct Stats {
     backend: &'static str,
     adapter: String,
+    /// How a GPU summed the kernels.
+    splat: Option<&'static str>,
     width: u32,
     height: u32,
     samples_per_pixel: u32,
@@ -66,6 +69,7 @@ impl Stats {
         Self {
             backend,
             adapter,
+            splat: player.path().map(SplatPath::name),
             width: frame.width,
             height: frame.height,
             samples_per_pixel: frame.samples_per_pixel,

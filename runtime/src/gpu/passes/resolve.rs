@@ -3,7 +3,7 @@
 use super::super::bindings::{Slot, compute, group, layout, pipeline_layout};
 use super::super::scene::AssetBuffers;
 use super::super::shaders;
-use super::super::targets::{ARGUMENTS, Targets};
+use super::super::targets::{ARGUMENTS, OVER_CELLS, Targets};
 use super::super::timers::Pass;
 use super::Recorder;
 use wgpu::{BindGroup, BindGroupLayout, BindingResource, ComputePipeline, Device, ShaderStages};
@@ -36,7 +36,7 @@ impl Resolve {
 
     /// Does nothing where no pixel has this piece.
     pub fn record(&self, r: &mut Recorder, group: &BindGroup, targets: &Targets, piece: usize) {
-        let at = ARGUMENTS * piece as u64 + 16;
+        let at = ARGUMENTS * piece as u64 + OVER_CELLS;
         r.compute(Pass::Resolve, &self.pipeline, group, |pass| {
             pass.dispatch_workgroups_indirect(&targets.arguments, at);
         });

@@ -1,7 +1,7 @@
 //! The splat pass: every sample's kernel along one inside piece of every pixel.
 
 use super::super::bindings::{Slot, group, layout, options, pipeline_layout};
-use super::super::scene::AssetBuffers;
+use super::super::scene::{AssetBuffers, Variant};
 use super::super::shaders;
 use super::super::targets::{ARGUMENTS, SUM_FORMAT, Targets};
 use super::super::timers::Pass;
@@ -24,9 +24,7 @@ pub(crate) struct Splat {
     layout: BindGroupLayout,
     pipeline_layout: PipelineLayout,
     module: ShaderModule,
-    heterogeneous: bool,
-    /// Whether the pipeline takes all channels for alike.
-    grey: bool,
+    variant: Variant,
     pipeline: RenderPipeline,
 }
 
@@ -35,17 +33,16 @@ impl Splat {
         let layout = layout(device, "splat", ShaderStages::VERTEX_FRAGMENT, &[Slot::Read; 5]);
         let pipeline_layout = pipeline_layout(device, "splat", common, &layout);
         let module = shaders::module(device, "splat", shaders::SPLAT);
-        let (heterogeneous, grey) = (asset.heterogeneous, asset.material.is_grey());
-        let pipeline = Self::pipeline(device, &pipeline_layout, &module, heterogeneous, grey);
-        Self { layout, pipeline_layout, module, heterogeneous, grey, pipeline }
+        let variant = asset.variant();
+        let pipeline = Self::pipeline(device, &pipeline_layout, &module, variant);
+        Self { layout, pipeline_layout, module, variant, pipeline }
     }
 
-    /// Compiles the pass anew where the channels become alike or stop being so.
-    pub fn set_grey(&mut self, device: &Device, grey: bool) {
-        if grey != self.grey {
-            self.grey = grey;
-            self.pipeline =
-                Self::pipeline(device, &self.pipeline_layout, &self.module, self.heterogeneous, grey);
+    /// Compiles the pass anew where another material needs other code.
+    pub fn set_variant(&mut self, device: &Device, variant: Variant) {
+        if variant != self.variant {
+            self.variant = variant;
+            self.pipeline = Self::pipeline(device, &self.pipeline_layout, &self.module, variant);
         }
     }
 
@@ -53,11 +50,9 @@ impl Splat {
         device: &Device,
         layout: &PipelineLayout,
         module: &ShaderModule,
-        heterogeneous: bool,
-        grey: bool,
+        variant: Variant,
     ) -> RenderPipeline {
-        let constants =
-            [("GREY", f64::from(u8::from(grey))), ("HETEROGENEOUS", f64::from(u8::from(heterogeneous)))];
+        let constants = variant.constants();
         let target = Some(ColorTargetState {
             format: SUM_FORMAT,
             blend: Some(BlendState { color: ADD, alpha: ADD }),

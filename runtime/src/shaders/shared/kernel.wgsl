@@ -1,5 +1,8 @@
 // The samples' kernel integrated along a ray. Twin of formats/src/kernel.rs and formats/src/hits.rs, which state the
 // formulas.
+// Whether the medium is too dense over some kernel for the form without branches.
+override DENSE: bool = false;
+
 const CUT_OFF: f32 = 5.0;
 const CUT_OFF_VALUE: f32 = 0.006737947;
 const CUT_OFF_RADIUS: f32 = 2.236068;
@@ -64,33 +67,41 @@ fn kernel_integral(a: f32, d2: f32, s: f32, length: f32, kappa: f32) -> f32 {
     return max(HALF_ROOT_PI / a * sum - cut, 0.0);
 }
 
-// erf x, absolute error below 5e-7.
-fn error_function(value: f32) -> f32 {
-    let x = clamp(value, -3.95, 3.95);
-    let s = x * x;
-    var p = 3.917343e-3 + s * (2.8760142e-4 + s * 2.0117403e-6);
-    p = 1.128379 + s * (0.19403625 + s * (0.053207136 + s * p));
-    var q = 1.5270751e-2 + s * (1.1982075e-3 + s * 3.783973e-5);
-    q = 1.0 + s * (0.50529164 + s * (0.11559099 + s * q));
-    return x * p / q;
+// e^(x*x) erfc(x) for x >= 0 without an exponential. Twin of `approx::scaled_erfc`.
+fn plain_scaled_erfc(x: f32) -> f32 {
+    let t = 1.0 / (1.0 + 0.4 * x);
+    var p = 0.16864386 + t * (-0.18261535 + t * 0.05018729);
+    p = 0.16857818 + t * (0.14127734 + t * (-0.005255413 + t * p));
+    return t * (0.22567587 + t * (0.22566977 + t * (0.20783858 + t * p)));
 }
 
-// The same as kernel_integral * e^-before and mean_offset in fewer steps, for kappa <= a and pieces that are not tiny.
-fn mild_integral(a: f32, d2: f32, s: f32, length: f32, kappa: f32, before: f32) -> vec2f {
+// sinh z / z of z * z within 0..20. Twin of `hits::sinh_ratio`.
+fn sinh_ratio(z2: f32) -> f32 {
+    let p = 2.0039116e-4 + z2 * (2.5384886e-6 + z2 * 3.54011e-8);
+    return 0.999998 + z2 * (0.16667679 + z2 * (0.008325651 + z2 * p));
+}
+
+// Integral over `length` from `s` behind the closest approach, inside the support, of e^-tau kernel, where the medium lets
+// e^-before through in front of it, and the mean distance from the closest approach under it. Twin of
+// `hits::attenuated_integral`; without branches, for kappa up to 2 a.
+fn attenuated_integral(a: f32, d2: f32, s: f32, length: f32, kappa: f32, before: f32) -> vec2f {
     let inverse = 1.0 / a;
     let half = 0.5 * kappa * inverse;
     let u0 = a * s;
+    let u1 = a * (s + length);
     let x0 = u0 + half;
-    let x1 = x0 + a * length;
-    let scale = exp(half * (half + 2.0 * u0) - a * a * d2 - before);
+    let x1 = u1 + half;
     let y = kappa * length;
-    let series = 1.0 - y * (0.5 - y * (1.0 / 6.0 - y * (1.0 / 24.0 - y * (1.0 / 120.0))));
-    let mean = select((1.0 - exp(-y)) / max(y, 0.1), series, y < 0.2);
-    let cut = CUT_OFF_VALUE * length * mean * exp(-before);
-    let whole = HALF_ROOT_PI * inverse * scale * (error_function(x1) - error_function(x0));
-    let u1 = u0 + a * length;
-    let ends = exp(-a * a * d2 - u0 * u0 - before) - exp(-a * a * d2 - u1 * u1 - y - before);
-    let offset = inverse * (0.5 * inverse * ends / max(whole, 1e-30) - half);
+    let front = a * a * d2 + before;
+    let e0 = exp(-front - u0 * u0);
+    let e1 = exp(-front - y - u1 * u1);
+    let peak = 2.0 * exp(min(half * (u0 + x0) - front, 0.0));
+    let p0 = plain_scaled_erfc(abs(x0)) * e0;
+    let p1 = plain_scaled_erfc(abs(x1)) * e1;
+    let between = select(0.0, peak, x0 < 0.0 && x1 > 0.0);
+    let whole = HALF_ROOT_PI * inverse * (select(-p0, p0, x0 >= 0.0) - select(-p1, p1, x1 > 0.0) + between);
+    let cut = CUT_OFF_VALUE * length * sinh_ratio(0.25 * y * y) * exp(-before - 0.5 * y);
+    let offset = inverse * (0.5 * inverse * (e0 - e1) / max(whole, 1e-30) - half);
     return vec2f(max(whole - cut, 0.0), clamp(offset, s, s + length));
 }
 
@@ -114,20 +125,17 @@ struct Path {
     scattering: f32,    // the same of the scattering part
 }
 
-// Pieces shorter than this many kernel widths 1/a take the general form.
-const LEAST_WIDTHS: f32 = 0.1;
-
 // Weight of a kernel without its own factor w, for the extinction `kappa` of one channel, and the mean distance from
 // the closest approach under it.
-fn kernel_weight(a: f32, d2: f32, path: Path, kappa: f32, long: bool) -> vec2f {
+fn kernel_weight(a: f32, d2: f32, path: Path, kappa: f32) -> vec2f {
     let here = kappa * path.density;
     var weight = vec2f(0.0);
-    if (long && here <= a) {
-        weight = mild_integral(a, d2, path.s, path.length, here, kappa * path.before);
-    } else {
+    if (DENSE) {
         let g = kernel_integral(a, d2, path.s, path.length, here);
         let mean = mean_offset(a, d2, path.s, path.length, here, g);
         weight = vec2f(exp(-kappa * path.before) * g, mean);
+    } else {
+        weight = attenuated_integral(a, d2, path.s, path.length, here, kappa * path.before);
     }
     return vec2f(weight.x * path.scattering, weight.y);
 }

@@ -1,0 +1,259 @@
+// Gather pass: the kernels along the current piece of every pixel of a tile, summed in registers, and what comes of
+// them added to the picture: splat and resolve in one, without blending.
+//
+// A workgroup first finds the clusters of 64 samples that rays of its tile may meet, then those of their samples; the
+// bits of `marks` keep them in order, so that the sums do not depend on threads. Each thread then has two pixels side by
+// side in each half of the tile. How those that are listed are added, `add_listed`, and the entry point follow in
+// gather_lanes.wgsl or gather_plain.wgsl.
+
+@group(1) @binding(0) var<storage, read> samples: array<vec4f>;  // position, sharpness
+@group(1) @binding(1) var<storage, read> sources: array<vec4f>;  // SOURCE a sample: v, weight; slopes
+@group(1) @binding(2) var<storage, read> clusters: array<vec4f>; // a sphere around 64 kernels each
+@group(1) @binding(3) var<storage, read> piece: array<vec4f>;
+@group(1) @binding(4) var<storage, read> profile: array<vec4f>;
+@group(1) @binding(5) var<storage, read_write> front: array<vec4f>;
+@group(1) @binding(6) var<storage, read_write> radiance: array<vec4f>;
+@group(1) @binding(7) var<storage, read_write> counters: array<vec4u>;
+
+const SOURCE: u32 = 4u;
+const SIDE: u32 = 16u;          // of a tile, pixels
+const HALVES: u32 = 2u;         // upper and lower: threads have two pixels in each
+const CLUSTER: u32 = 64u;       // samples of a cluster, and threads of a workgroup
+const WORDS: u32 = 32u;
+const ROUND: u32 = 1024u;       // bits of all words: clusters looked at together
+const GROUP: u32 = 16u;         // clusters whose samples are looked at together
+const DARK: f32 = 16.0;         // optical depth behind which nothing is seen in single precision
+// Below this cosine of the half angle a cone is not used: everything is a candidate.
+const LEAST_COSINE: f32 = 0.1;
+
+// Starts and ends of pieces as bits: least start, greatest start, greatest end.
+var<workgroup> bounds: array<atomic<u32>, 3>;
+var<workgroup> marks: array<atomic<u32>, WORDS>;
+var<workgroup> found: array<u32, ROUND>;
+var<workgroup> listed: array<u32, 2 * ROUND>;
+var<workgroup> count: u32;
+var<workgroup> range: vec2f;
+
+// The directions of a tile's rays, and how far away they are inside the object. Twin of `cpu::tiles::Cone`.
+struct Cone {
+    axis: vec3f,
+    cosine: f32,
+    sine: f32,
+    near: f32,
+    far: f32,
+}
+
+fn corner_direction(corner: vec2u) -> vec3f {
+    let at = vec2f(view.tile_start + corner);
+    let d = view.forward + view.right * (at.x * view.pixel.x - 1.0) + view.up * (1.0 - at.y * view.pixel.y);
+    return normalize(d);
+}
+
+fn cone_of(low: vec2u, near: f32, far: f32) -> Cone {
+    let high = low + SIDE;
+    let a = corner_direction(low);
+    let b = corner_direction(vec2u(high.x, low.y));
+    let c = corner_direction(vec2u(low.x, high.y));
+    let d = corner_direction(high);
+    let sum = a + b + c + d;
+    let axis = sum / max(length(sum), 1e-30);
+    let cosine = min(min(dot(a, axis), dot(b, axis)), min(dot(c, axis), dot(d, axis))) - 1e-6;
+    return Cone(axis, cosine, sqrt(max(1.0 - cosine * cosine, 0.0)), near, far);
+}
+
+// Whether rays of the cone may meet a sphere around `centre`, as seen from the camera, where they are inside.
+fn may_meet(cone: Cone, centre: vec3f, exact_radius: f32) -> bool {
+    let distance = length(centre);
+    let radius = exact_radius * 1.001 + distance * 1e-6;
+    if (distance - radius > cone.far || distance + radius < cone.near) {
+        return false;
+    }
+    if (!(cone.cosine > LEAST_COSINE)) {
+        return true;
+    }
+    let along = dot(centre, cone.axis);
+    let across = length(centre - cone.axis * along);
+    return across * cone.cosine - along * cone.sine <= radius && along >= -radius;
+}
+
+fn mark(bit: u32) {
+    atomicOr(&marks[bit / 32u], 1u << (bit & 31u));
+}
+
+// The greatest distance at which rays see kernels that enter the object at `start` at the latest and leave it at `end`.
+fn sight(start: f32, end: f32) -> f32 {
+    if (HETEROGENEOUS) {
+        return end;
+    }
+    let least = max(min(medium.kappa.x, min(medium.kappa.y, medium.kappa.z)), 1e-30);
+    return min(end, start + DARK / least);
+}
+
+fn kernel_of(sample: u32) -> Kernel {
+    let s = samples[sample];
+    let at = SOURCE * sample;
+    return Kernel(s.xyz - view.origin, s.w, sources[at],
+        sources[at + 1u].xyz, sources[at + 2u].xyz, sources[at + 3u].xyz);
+}
+
+// One ray of a thread.
+struct Ray {
+    index: u32,
+    ends: vec4f,        // of the piece, transmittances of its boundary
+    direction: vec3f,
+}
+
+struct Sums {
+    numerator: vec3f,
+    kernels: u32,       // that the ray met
+    denominator: vec3f,
+}
+
+fn sum(sums: Sums, one: Contribution) -> Sums {
+    return Sums(sums.numerator + one.numerator, sums.kernels + u32(one.met), sums.denominator + one.denominator);
+}
+
+// The rays of a thread in one half, and what they gathered.
+struct Pair {
+    left: Ray,
+    right: Ray,
+}
+
+struct PairSums {
+    left: Sums,
+    right: Sums,
+}
+
+fn ray_at(pixel: vec2u) -> Ray {
+    var ray = Ray(0u, vec4f(0.0), ray_direction(pixel));
+    if (all(pixel < view.tile_size)) {
+        ray.index = pixel_index(pixel);
+        ray.ends = piece[ray.index];
+    }
+    return ray;
+}
+
+// Eight threads that follow each other have 4 x 4 pixels, and so on.
+fn rays_of(tile: vec2u, half: u32, local: u32) -> Pair {
+    let x = 2u * (local & 1u) + ((local >> 1u) & 4u) + ((local >> 2u) & 8u);
+    let y = ((local >> 1u) & 3u) + ((local >> 2u) & 4u) + 8u * half;
+    let pixel = tile * SIDE + vec2u(x, y);
+    return Pair(ray_at(pixel), ray_at(pixel + vec2u(1u, 0u)));
+}
+
+fn is_inside(ray: Ray) -> bool {
+    return ray.ends.y > ray.ends.x;
+}
+
+fn bound(ray: Ray) {
+    if (is_inside(ray)) {
+        atomicMin(&bounds[0], bitcast<u32>(ray.ends.x));
+        atomicMax(&bounds[1], bitcast<u32>(ray.ends.x));
+        atomicMax(&bounds[2], bitcast<u32>(ray.ends.y));
+    }
+}
+
+fn finish(ray: Ray, sums: Sums) {
+    if (is_inside(ray)) {
+        join(ray.index, ray.ends, sums.numerator, sums.denominator, sums.kernels);
+    }
+}
+
+// Lists those that are marked, in order, behind the first `before`; `base` is what the first bit of the thread's word
+// stands for.
+fn list_marked(local: u32, before: u32, base: u32) {
+    if (local < WORDS) {
+        var place = before;
+        for (var word = 0u; word < local; word++) {
+            place += countOneBits(atomicLoad(&marks[word]));
+        }
+        for (var bits = atomicLoad(&marks[local]); bits != 0u; bits &= bits - 1u) {
+            listed[place] = base + firstTrailingBit(bits);
+            place++;
+        }
+        if (local == WORDS - 1u) {
+            count = place;
+        }
+    }
+}
+
+// One of 64 threads of a tile; `lane` of `lanes` that can talk.
+fn gather(tile: vec2u, local: u32, lane: u32, lanes: u32) {
+    if (local < WORDS) {
+        atomicStore(&marks[local], 0u);
+    }
+    if (local < 3u) {
+        atomicStore(&bounds[local], select(0u, 0xffffffffu, local == 0u));
+    }
+    workgroupBarrier();
+    for (var half = 0u; half < HALVES; half++) {
+        let rays = rays_of(tile, half, local);
+        bound(rays.left);
+        bound(rays.right);
+    }
+    workgroupBarrier();
+    if (local == 0u) {
+        range = vec2f(1.0, 0.0);
+        if (atomicLoad(&bounds[2]) > 0u) {
+            let far = sight(bitcast<f32>(atomicLoad(&bounds[1])), bitcast<f32>(atomicLoad(&bounds[2])));
+            range = vec2f(bitcast<f32>(atomicLoad(&bounds[0])), far);
+        }
+    }
+    let reach = workgroupUniformLoad(&range);
+    if (reach.y < reach.x) {
+        return;
+    }
+    let cone = cone_of(tile * SIDE, reach.x, reach.y);
+    var sums: array<PairSums, HALVES>;
+    let total = (medium.samples + CLUSTER - 1u) / CLUSTER;
+    for (var first = 0u; first < total; first += ROUND) {
+        for (var bit = local; bit < min(ROUND, total - first); bit += CLUSTER) {
+            let sphere = clusters[first + bit];
+            if (sphere.w > 0.0 && may_meet(cone, sphere.xyz - view.origin, sphere.w)) {
+                mark(bit);
+            }
+        }
+        workgroupBarrier();
+        list_marked(local, 0u, first + 32u * local);
+        let hits = workgroupUniformLoad(&count);
+        for (var k = local; k < hits; k += CLUSTER) {
+            found[k] = listed[k];
+        }
+        if (local < WORDS) {
+            atomicStore(&marks[local], 0u);
+        }
+        workgroupBarrier();
+        var known = 0u;
+        for (var group = 0u; group < hits; group += GROUP) {
+            let end = min(group + GROUP, hits);
+            for (var k = group; k < end; k++) {
+                let sample = found[k] * CLUSTER + local;
+                if (sample < medium.samples) {
+                    let kernel = samples[sample];
+                    if (may_meet(cone, kernel.xyz - view.origin, CUT_OFF_RADIUS / kernel.w)) {
+                        mark((k - group) * CLUSTER + local);
+                    }
+                }
+            }
+            workgroupBarrier();
+            list_marked(local, known, found[min(group + local / 2u, hits - 1u)] * CLUSTER + 32u * (local & 1u));
+            known = workgroupUniformLoad(&count);
+            if (local < WORDS) {
+                atomicStore(&marks[local], 0u);
+            }
+            // The next group may list as many again.
+            if (end == hits || known > ROUND) {
+                for (var half = 0u; half < HALVES; half++) {
+                    sums[half] = add_listed(sums[half], known, lane, lanes, rays_of(tile, half, local));
+                }
+                known = 0u;
+            }
+            workgroupBarrier();
+        }
+    }
+    for (var half = 0u; half < HALVES; half++) {
+        let rays = rays_of(tile, half, local);
+        finish(rays.left, sums[half].left);
+        finish(rays.right, sums[half].right);
+    }
+}

@@ -1,0 +1,17 @@
+// Adds listed kernels to the sums of rays where lanes cannot talk. Concatenated after gather.wgsl.
+fn add_listed(before: PairSums, count: u32, lane: u32, lanes: u32, rays: Pair) -> PairSums {
+    var sums = before;
+    for (var k = 0u; k < count; k++) {
+        let kernel = kernel_of(listed[k]);
+        sums.left = sum(sums.left,
+            contribution(kernel, rays.left.index, rays.left.direction, rays.left.ends.xy));
+        sums.right = sum(sums.right,
+            contribution(kernel, rays.right.index, rays.right.direction, rays.right.ends.xy));
+    }
+    return sums;
+}
+
+@compute @workgroup_size(64)
+fn gather_plainly(@builtin(workgroup_id) tile: vec3u, @builtin(local_invocation_index) local: u32) {
+    gather(tile.xy, local, 0u, 1u);
+}
