@@ -9,6 +9,7 @@
 pub mod cpu;
 pub mod edit;
 pub mod exact;
+pub mod fold;
 pub mod frame;
 pub mod framing;
 pub mod gpu;

@@ -105,6 +105,10 @@ impl Player {
     /// pass.
     pub fn set_reuse(&mut self, reuse: bool) {
         self.reuse = reuse;
+        match &mut self.engine {
+            Engine::Cpu(cpu) => cpu.set_reuse(reuse),
+            Engine::Gpu(gpu) => gpu.set_reuse(reuse),
+        }
     }
 
     /// Plays another extinction and albedo from the next frame on, relative to those that were baked: edits do not

@@ -1,5 +1,6 @@
 //! What a backend hands back for one frame: the same for both.
 
+use crate::fold::LightCounts;
 use diaphane_formats::picture::Picture;
 use serde::Serialize;
 
@@ -13,6 +14,8 @@ pub struct Rendered {
     pub picture: Picture,
     /// What was counted on the way.
     pub counters: Counters,
+    /// What became of the lights.
+    pub lights: LightCounts,
     /// Name and milliseconds of every pass that ran, in order; passes that were reused are absent.
     pub passes: Vec<(&'static str, f64)>,
 }

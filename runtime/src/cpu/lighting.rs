@@ -9,16 +9,19 @@
 //! ψ = exp(-κ/κ̄ · τ̄) with τ̄ decoded from the sample's spherical harmonics and lobe (κ̄ = 0: ψ = 1); bands that a sample
 //! does not have cost nothing. β is the boundary's
 //! Fresnel transmittance from its own coefficients, clamped to 0..1 (index matched: 1). A table of exact depths m
-//! gives ψ = exp(-κ m) and β instead. Lights that do not reach the sample (outside a spot's cone) are skipped.
+//! gives ψ = exp(-κ m) and β instead. Lights that do not reach the sample (outside a spot's cone) are skipped; many
+//! directional lights are folded into one vector ([`crate::fold`]).
 
 use crate::exact::ExactDepths;
+use crate::fold::{Ambient, LightCounts, Linear, Plan, linear};
 use crate::frame::{Frame, FrameLight, LightKind};
-use diaphane_formats::asset::{Asset, Info, Samples};
+use diaphane_formats::asset::{Info, Samples};
 use diaphane_formats::encoding::Encoding;
 use diaphane_formats::harmonics::Coefficients;
 use diaphane_formats::sh::{self, MAX_ORDER, coefficient_count};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
+use std::sync::OnceLock;
 
 /// What the lighting pass needs of an asset beside the samples themselves.
 #[derive(Clone, Debug)]
@@ -38,6 +41,8 @@ pub struct Lighting {
     lobe: Vec<Vec3>,
     /// Empty when index matched.
     boundary: Coefficients,
+    /// Transmittance for folded lights, once it was asked for.
+    linear: OnceLock<Linear>,
 }
 
 /// A light with the basis of its direction, where that is the same for all samples.
@@ -48,9 +53,8 @@ struct Prepared<'a> {
 }
 
 impl Lighting {
-    /// Parameters of an asset.
-    pub fn new(asset: &Asset) -> Self {
-        let info = &asset.info;
+    /// Parameters and samples of an asset.
+    pub fn new(info: &Info, samples: &Samples) -> Self {
         let mut lighting = Self {
             extinction: Vec3::ZERO,
             ratio: None,
@@ -58,9 +62,10 @@ impl Lighting {
             g: info.phase.mean_cosine() as f32,
             encoding: info.encoding,
             order: info.order.max(info.boundary_order) as usize,
-            depth: asset.samples.depth.decoded(),
-            lobe: asset.samples.lobe.clone(),
-            boundary: asset.samples.boundary.decoded(),
+            depth: samples.depth.decoded(),
+            lobe: samples.lobe.clone(),
+            boundary: samples.boundary.decoded(),
+            linear: OnceLock::new(),
         };
         lighting.set_material(info);
         lighting
@@ -69,23 +74,68 @@ impl Lighting {
     /// Takes extinction and albedo from an edited asset's parameters.
     pub fn set_material(&mut self, info: &Info) {
         self.extinction = DVec3::from(info.extinction).as_vec3();
-        self.ratio = (info.reference_extinction > 0.0).then(|| info.ratio());
+        let ratio = (info.reference_extinction > 0.0).then(|| info.ratio());
+        if ratio != self.ratio {
+            self.linear = OnceLock::new();
+        }
+        self.ratio = ratio;
         self.albedo = DVec3::from(info.albedo).as_vec3();
     }
 
-    /// v of every sample at its centroid, in the samples' order; parallel over samples.
-    pub fn values(&self, samples: &Samples, frame: &Frame, exact: Option<&ExactDepths>) -> Vec<Vec3> {
-        let lights: Vec<Prepared> = frame
-            .lights
+    /// v of every sample at its centroid, in the samples' order, under the lights of `plan`; parallel over samples.
+    pub fn values(
+        &self,
+        samples: &Samples,
+        frame: &Frame,
+        exact: Option<&ExactDepths>,
+        plan: &Plan,
+    ) -> Vec<Vec3> {
+        let lights: Vec<Prepared> = plan
+            .single
             .iter()
-            .enumerate()
-            .map(|(l, light)| self.prepare(l, light, samples, exact))
+            .filter_map(|l| frame.lights.get(*l).map(|light| self.prepare(*l, light, samples, exact)))
             .collect();
+        let folded = (!plan.folded.is_empty()).then(|| {
+            let lights = plan.folded.iter().filter_map(|l| frame.lights.get(*l));
+            let linear = self.linear(linear::BANDS);
+            (linear, Ambient::new(lights, self.g, frame.view.origin, linear.bands))
+        });
         (0..samples.len())
             .into_par_iter()
             .with_min_len(256)
-            .map(|i| self.source(samples, i, frame, &lights))
+            .map(|i| {
+                let mut value = self.source(samples, i, frame, &lights);
+                if let Some((linear, ambient)) = &folded {
+                    value += self.albedo * from_folded(linear, ambient, i, frame.view.origin, samples);
+                }
+                value
+            })
             .collect()
+    }
+
+    /// Numbers of a plan.
+    pub fn counts(&self, plan: &Plan) -> LightCounts {
+        plan.counts(self.linear.get().map_or(0.0, |l| l.error))
+    }
+
+    /// Highest order of any sample.
+    pub fn order(&self) -> usize {
+        self.order
+    }
+
+    /// 1 where the transmittance of all channels is the same, else 3.
+    pub fn channels(&self) -> usize {
+        if self.ratio.is_none_or(|r| r.x == r.y && r.y == r.z) { 1 } else { 3 }
+    }
+
+    /// The transmittance of all samples as harmonics of `bands` bands; made when first asked for.
+    pub fn linear(&self, bands: usize) -> &Linear {
+        self.linear.get_or_init(|| {
+            let channels = self.channels();
+            Linear::new(self.depth.len(), bands, channels, self.order, |i, to, basis| {
+                self.arriving(i, to, basis)
+            })
+        })
     }
 
     fn prepare<'a>(
@@ -139,7 +189,7 @@ impl Lighting {
     }
 
     /// ψ β of sample `i` in direction `to`, per channel, 0..1.
-    fn arriving(&self, i: usize, to: Vec3, basis: &[f32]) -> Vec3 {
+    pub(crate) fn arriving(&self, i: usize, to: Vec3, basis: &[f32]) -> Vec3 {
         let through =
             if self.boundary.is_empty() { 1.0 } else { dot(self.boundary.of(i), basis).clamp(0.0, 1.0) };
         let Some(ratio) = self.ratio else {
@@ -152,6 +202,21 @@ impl Lighting {
         }
         if ratio == Vec3::ONE { Vec3::splat((-tau).exp() * through) } else { (-ratio * tau).exp() * through }
     }
+}
+
+/// What all folded lights together send from sample `i` towards the camera at `origin`, for albedo 1.
+fn from_folded(linear: &Linear, ambient: &Ambient, i: usize, origin: Vec3, samples: &Samples) -> Vec3 {
+    let deviation = ambient.deviation(origin, samples.centroid(i));
+    let of = linear.of(i);
+    let mut sum = Vec3::ZERO;
+    for k in 0..ambient.count {
+        let through = match linear.channels {
+            1 => Vec3::splat(of[k]),
+            _ => Vec3::new(of[k], of[ambient.count + k], of[2 * ambient.count + k]),
+        };
+        sum += through * ambient.at(deviation, k);
+    }
+    sum.max(Vec3::ZERO)
 }
 
 /// Henyey-Greenstein's function in single precision, the formula of [`diaphane_formats::phase`].

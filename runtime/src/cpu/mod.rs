@@ -9,6 +9,7 @@ pub mod tiles;
 
 use crate::Result;
 use crate::exact::ExactDepths;
+use crate::fold::{LightingKey, Plan};
 use crate::frame::Frame;
 use crate::rendered::{Counters, RayResult, Rendered};
 use crate::usable::{MOST_EXTINCTION, largest_extinction, usable_samples};
@@ -40,6 +41,10 @@ pub struct CpuRenderer {
     corners: Vec<[Vec3; 3]>,
     normals: Vec<[Vec3; 3]>,
     samples_drawn: u64,
+    info: Info,
+    reuse: bool,
+    /// Sources of the last frame, and what they depend on.
+    lit: Option<(LightingKey, Vec<Source>)>,
 }
 
 impl CpuRenderer {
@@ -53,7 +58,7 @@ impl CpuRenderer {
         asset.medium()?;
         let samples = usable_samples(asset);
         Ok(Self {
-            lighting: Lighting::new(asset),
+            lighting: Lighting::new(&asset.info, &asset.samples),
             cloud: Cloud::new(&samples, asset.info.width_factor),
             stencil: Stencil::new(&samples, largest_extinction(&asset.info, asset.density.as_ref())),
             accel: Accel::new(&mesh),
@@ -65,7 +70,15 @@ impl CpuRenderer {
             normals: surface::corner_normals(&mesh),
             samples_drawn: samples.weight.iter().filter(|w| **w > 0.0).count() as u64,
             samples,
+            info: asset.info.clone(),
+            reuse: false,
+            lit: None,
         })
+    }
+
+    /// Whether later frames may keep the sources of an earlier one where lights and material are the same.
+    pub fn set_reuse(&mut self, reuse: bool) {
+        self.reuse = reuse;
     }
 
     /// Takes extinction and albedo from an edited asset's parameters; the rest of them must be the asset's own.
@@ -74,18 +87,24 @@ impl CpuRenderer {
         self.stencil.set_extinction(&self.samples, largest_extinction(info, self.density.as_ref()));
         self.extinction = extinction_along(info, self.density.is_some());
         self.means = means_share(info.ratio());
+        self.info = info.clone();
+        self.lit = None;
     }
 
     /// The source of every sample under the frame's lights, see [`lighting`].
     pub fn sources(&self, frame: &Frame, exact: Option<&ExactDepths>) -> Vec<Source> {
-        let values = self.lighting.values(&self.samples, frame, exact);
+        let plan = Plan::new(frame, &self.info, exact);
+        let values = self.lighting.values(&self.samples, frame, exact, &plan);
         self.stencil.sources(&values, self.means * frame.share_of_means(exact))
     }
 
     /// Draws a frame.
     pub fn render(&mut self, frame: &Frame, exact: Option<&ExactDepths>) -> Rendered {
         let started = Instant::now();
-        let sources = self.sources(frame, exact);
+        let key = LightingKey::new(frame, &self.info, exact);
+        let known = self.lit.take().filter(|(known, _)| self.reuse && *known == key);
+        let lit_anew = known.is_none();
+        let (key, sources) = known.unwrap_or_else(|| (key, self.sources(frame, exact)));
         let lighting_ms = milliseconds(started);
         let started = Instant::now();
         let offsets = subpixel_offsets(frame.samples_per_pixel as usize);
@@ -112,13 +131,13 @@ impl CpuRenderer {
         // The ray passes run interleaved on all threads: each gets its share of the time that passed on the clock.
         let all = seconds.iter().sum::<f64>().max(f64::MIN_POSITIVE);
         let share = |k: usize| wall * seconds[k] / all;
-        let passes = vec![
-            ("lighting", lighting_ms),
-            ("segments", share(0)),
-            ("splat", share(1)),
-            ("surface", share(2)),
-        ];
-        Rendered { picture, counters, passes }
+        let mut passes = vec![("segments", share(0)), ("splat", share(1)), ("surface", share(2))];
+        if lit_anew {
+            passes.insert(0, ("lighting", lighting_ms));
+        }
+        let lights = self.lighting.counts(&Plan::new(frame, &self.info, exact));
+        self.lit = Some((key, sources));
+        Rendered { picture, counters, lights, passes }
     }
 
     /// What one ray of every pixel sees, at `offset` inside the pixel (0..1): rows one after the other.

@@ -45,6 +45,11 @@ impl GpuRenderer {
         &self.name
     }
 
+    /// Whether later frames may keep the sources of an earlier one where lights and material are the same.
+    pub fn set_reuse(&mut self, reuse: bool) {
+        self.renderer.reuse = reuse;
+    }
+
     /// How kernels are summed.
     pub fn path(&self) -> SplatPath {
         self.renderer.path()
@@ -98,7 +103,7 @@ impl GpuRenderer {
         if passes.is_empty() {
             passes.push(("frame", started.elapsed().as_secs_f64() * 1e3));
         }
-        Ok(Rendered { picture, counters, passes })
+        Ok(Rendered { picture, counters, lights: self.renderer.light_counts(), passes })
     }
 
     /// What one ray of every pixel sees, at `offset` inside the pixel (0..1), without highlights: rows one after the

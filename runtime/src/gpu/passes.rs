@@ -2,6 +2,7 @@
 
 pub(super) mod boundary;
 pub(super) mod display;
+pub(super) mod fold;
 pub(super) mod gather;
 pub(super) mod lighting;
 pub(super) mod profile;

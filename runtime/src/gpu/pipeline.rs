@@ -2,6 +2,7 @@
 
 use super::passes::Recorder;
 use super::passes::boundary::Boundary;
+use super::passes::fold::Fold;
 use super::passes::gather::Gather;
 use super::passes::lighting::Lighting;
 use super::passes::profile::Profile;
@@ -14,8 +15,9 @@ use super::scene::{AssetBuffers, FrameBuffers, VIEW_STRIDE, common_layout};
 use super::targets::{TOTAL, Targets, budget};
 use super::tiles::{Tile, split};
 use super::timers::Timers;
-use super::uniforms::ViewUniform;
+use super::uniforms::{LightLayout, ViewUniform};
 use crate::exact::ExactDepths;
+use crate::fold::{LightCounts, LightingKey};
 use crate::frame::Frame;
 use crate::rendered::MAX_PIECES;
 use crate::{Error, Result};
@@ -26,6 +28,7 @@ use wgpu::{BindGroup, BindGroupLayout, CommandEncoder, Device, Features, Queue};
 pub(super) struct Pipeline {
     common: BindGroupLayout,
     lighting: Lighting,
+    fold: Fold,
     slopes: Slopes,
     surface: Surface,
     boundary: Option<Boundary>,
@@ -34,6 +37,12 @@ pub(super) struct Pipeline {
     splatting: Splatting,
     pub(super) asset: AssetBuffers,
     frame: FrameBuffers,
+    /// Whether later frames may keep the sources of an earlier one.
+    pub(super) reuse: bool,
+    /// What the sources that are there depend on.
+    lit: Option<LightingKey>,
+    /// Whether the frame that was begun needs other sources.
+    relight: bool,
     targets: Option<(Targets, Groups)>,
     /// Bytes that the state of all pixels may take.
     pub(super) most_memory: u64,
@@ -73,6 +82,7 @@ enum Splatting {
 /// The groups of all passes.
 struct Groups {
     lighting: BindGroup,
+    fold: BindGroup,
     slopes: BindGroup,
     surface: BindGroup,
     boundary: Option<BindGroup>,
@@ -103,6 +113,7 @@ impl Pipeline {
         let asset = AssetBuffers::new(device, asset)?;
         Ok(Self {
             lighting: Lighting::new(device, &common, &asset),
+            fold: Fold::new(device, &common),
             slopes: Slopes::new(device, &common),
             surface: Surface::new(device, &common),
             boundary: asset.fresnel.then(|| Boundary::new(device, &common)),
@@ -118,6 +129,9 @@ impl Pipeline {
             frame: FrameBuffers::new(device, &common, &asset),
             common,
             asset,
+            reuse: false,
+            lit: None,
+            relight: true,
             targets: None,
             most_memory: TOTAL,
         })
@@ -134,6 +148,7 @@ impl Pipeline {
     /// Takes extinction and albedo from an edited asset's parameters.
     pub(super) fn set_material(&mut self, device: &Device, queue: &Queue, info: &Info) {
         self.asset.set_material(queue, info);
+        self.lit = None;
         let variant = self.asset.variant();
         match &mut self.splatting {
             Splatting::Quads(splat, _) => splat.set_variant(device, variant),
@@ -149,7 +164,13 @@ impl Pipeline {
         frame: &Frame,
         exact: Option<&ExactDepths>,
     ) -> Result<Vec<Tile>> {
-        self.frame.write_lights(device, queue, &self.asset, frame, exact)?;
+        let key = LightingKey::new(frame, &self.asset.info, exact);
+        self.relight = !self.reuse || self.lit.as_ref() != Some(&key);
+        // Not before all went well.
+        self.lit = None;
+        if self.relight {
+            self.frame.write_lights(device, queue, &self.asset, frame, exact)?;
+        }
         let tiles = split(frame.width, frame.height, budget(device, &self.asset, self.most_memory))?;
         // The first tile is the largest; `split` returns at least one.
         let fits = self.targets.as_ref().is_some_and(|(t, _)| t.size == tiles[0].size);
@@ -159,6 +180,7 @@ impl Pipeline {
             let groups = self.groups(device, &targets);
             self.targets = Some((targets, groups));
         }
+        self.lit = Some(key);
         Ok(tiles)
     }
 
@@ -175,11 +197,21 @@ impl Pipeline {
     ) {
         let mut views = Vec::with_capacity(tiles.len() * offsets.len());
         for &tile in tiles {
-            let (diagonal, means) = (self.asset.diagonal, self.frame.means);
-            let view = |(&offset, rays)| ViewUniform::new(frame, diagonal, tile, offset, rays, means);
+            let diagonal = self.asset.diagonal;
+            let lights = LightLayout {
+                single: self.frame.plan.single.len() as u32,
+                first_scene_light: self.frame.first_scene_light,
+                means: self.frame.means,
+            };
+            let view = |(&offset, rays)| ViewUniform::new(frame, diagonal, tile, offset, rays, lights);
             views.extend(offsets.iter().zip(before + 1..).map(view));
         }
         self.frame.write_views(device, queue, &self.common, &self.asset, &views);
+    }
+
+    /// What became of the lights of the frame that was begun.
+    pub(super) fn light_counts(&self) -> LightCounts {
+        self.frame.plan.counts(self.frame.fold_error())
     }
 
     /// The layout of the group that all passes share.
@@ -207,10 +239,13 @@ impl Pipeline {
     /// Records the lighting of all samples.
     pub(super) fn record_lighting(&self, encoder: &mut CommandEncoder, timers: &mut Timers) {
         let Some((_, groups)) = &self.targets else { return };
-        if self.asset.sample_count > 0 {
+        if self.asset.sample_count > 0 && self.relight {
             let mut r =
                 Recorder { encoder, timers, common: self.frame.common(), view_offset: 0, tile: [0; 2] };
             self.lighting.record(&mut r, &groups.lighting, &self.asset);
+            if !self.frame.plan.folded.is_empty() {
+                self.fold.record(&mut r, &groups.fold, &self.asset);
+            }
             self.slopes.record(&mut r, &groups.slopes, &self.asset);
         }
     }
@@ -270,6 +305,7 @@ impl Pipeline {
         };
         Groups {
             lighting: self.lighting.bind(device, asset, frame),
+            fold: self.fold.bind(device, asset, frame),
             slopes: self.slopes.bind(device, asset),
             surface: self.surface.bind(device, asset, targets),
             boundary: self.boundary.as_ref().map(|b| b.bind(device, asset, frame, targets)),

@@ -4,16 +4,19 @@ use super::bindings::{Slot, empty_buffer, filled_buffer, group, layout};
 use super::neighbours::neighbours;
 use super::packed;
 use super::uniforms::{LightRecord, MediumUniform, ViewUniform};
+use crate::cpu::lighting::Lighting;
 use crate::cpu::surface::corner_normals;
 use crate::exact::ExactDepths;
+use crate::fold::{Ambient, Linear, Plan};
 use crate::frame::Frame;
 use crate::usable::{density_at, usable_samples};
 use crate::{Error, Result};
-use diaphane_formats::asset::{Asset, Info};
+use diaphane_formats::asset::{Asset, Info, Samples};
 use diaphane_formats::hits::DENSE;
 use diaphane_formats::slopes::{NEIGHBOURS, Stencil};
 use diaphane_formats::{kernel, sh};
 use glam::Vec3;
+use half::f16;
 use wgpu::{BindGroup, BindGroupLayout, Buffer, BufferBinding, BufferUsages, Device, Queue, ShaderStages};
 
 /// Everything that stays as long as the asset does.
@@ -45,6 +48,10 @@ pub(super) struct AssetBuffers {
     pub values: Buffer,
     /// Written by the slopes pass.
     pub sources: Buffer,
+    /// As they are played.
+    pub info: Info,
+    /// Kept for the transmittance of folded lights.
+    source: Samples,
     /// Of the grid; 1 without.
     most_density: f32,
     /// Of the widest kernel.
@@ -126,6 +133,7 @@ impl AssetBuffers {
             spokes: filled_buffer(device, "spokes", &spokes, storage),
             values: empty_buffer(device, "values", 16 * kernels.len() as u64, storage),
             sources: empty_buffer(device, "sources", 64 * kernels.len() as u64, storage),
+            info: info.clone(),
             most_density: if grid.is_empty() {
                 1.0
             } else {
@@ -146,12 +154,14 @@ impl AssetBuffers {
                 BufferUsages::UNIFORM | BufferUsages::COPY_DST,
             ),
             material,
+            source: samples,
         })
     }
 
     /// Takes extinction and albedo from an edited asset's parameters: a few bytes to upload.
     pub fn set_material(&mut self, queue: &Queue, info: &Info) {
         self.material.set_material(info, self.heterogeneous);
+        self.info = info.clone();
         queue.write_buffer(&self.medium, 0, bytemuck::bytes_of(&self.material));
     }
 
@@ -219,10 +229,19 @@ pub(super) struct FrameBuffers {
     views: Buffer,
     pub lights: Buffer,
     pub exact: Buffer,
+    /// Transmittance for folded lights, of the material whose ratio this is.
+    pub linear: Buffer,
+    known: Option<(Vec3, Linear)>,
+    /// What folded lights send.
+    pub ambient: Buffer,
     common: BindGroup,
     changed: bool,
+    /// Which lights are evaluated how.
+    pub plan: Plan,
     /// Share of the lights that baked means serve.
     pub means: f32,
+    /// Place of the scene's first light among the records.
+    pub first_scene_light: u32,
 }
 
 /// The layout of the group that all passes share: the ray's view and the medium.
@@ -254,8 +273,13 @@ impl FrameBuffers {
             views,
             lights: empty_buffer(device, "lights", 64, BufferUsages::STORAGE | BufferUsages::COPY_DST),
             exact: empty_buffer(device, "exact", 16, BufferUsages::STORAGE | BufferUsages::COPY_DST),
+            linear: empty_buffer(device, "linear", 16, BufferUsages::STORAGE | BufferUsages::COPY_DST),
+            known: None,
+            ambient: empty_buffer(device, "ambient", 16, BufferUsages::STORAGE | BufferUsages::COPY_DST),
             changed: true,
+            plan: Plan::default(),
             means: 1.0,
+            first_scene_light: 0,
         }
     }
 
@@ -303,15 +327,23 @@ impl FrameBuffers {
         exact: Option<&ExactDepths>,
     ) -> Result<()> {
         self.means = frame.share_of_means(exact);
+        self.plan = Plan::new(frame, &asset.info, exact);
+        self.fold(device, queue, asset, frame);
+        // Those that are evaluated first, an environment's in front; then the scene's others, for highlights alone.
+        let is_single = |l: usize| self.plan.single.binary_search(&l).is_ok();
+        let environment = self.plan.single.iter().copied().filter(|l| *l >= frame.scene_lights);
+        let scene = self.plan.single.iter().copied().filter(|l| *l < frame.scene_lights);
+        let others = (0..frame.scene_lights).filter(|l| !is_single(*l));
+        self.first_scene_light = environment.clone().count() as u32;
         let mut tables: Vec<&[[f32; 2]]> = Vec::new();
         let mut records = Vec::with_capacity(frame.lights.len());
-        for (i, light) in frame.lights.iter().enumerate() {
-            let table = exact.and_then(|e| e.light(i)).filter(|t| t.len() == asset.sample_count as usize);
+        for l in environment.chain(scene).chain(others) {
+            let table = exact.and_then(|e| e.light(l)).filter(|t| t.len() == asset.sample_count as usize);
             let slot = table.map(|t| {
                 tables.push(t);
                 tables.len() as u32 - 1
             });
-            records.push(LightRecord::new(light, slot));
+            records.push(LightRecord::new(&frame.lights[l], slot));
         }
         let limits = device.limits();
         let most = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
@@ -335,6 +367,48 @@ impl FrameBuffers {
             queue.write_buffer(&self.exact, k as u64 * table_bytes, bytemuck::cast_slice(table));
         }
         Ok(())
+    }
+}
+
+impl FrameBuffers {
+    /// Uploads what the fold pass needs for the lights that the plan folds. Where its coefficients do not fit the adapter
+    /// the lights are evaluated one by one.
+    fn fold(&mut self, device: &Device, queue: &Queue, asset: &AssetBuffers, frame: &Frame) {
+        if self.plan.folded.is_empty() {
+            return;
+        }
+        let ratio = asset.material.ratio;
+        if self.known.as_ref().is_none_or(|(known, _)| *known != ratio) {
+            let lighting = Lighting::new(&asset.info, &asset.source);
+            let limits = device.limits();
+            let most = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
+            let Some(bands) = Linear::fitting(asset.source.len(), lighting.channels(), most) else {
+                self.plan.single.append(&mut self.plan.folded);
+                self.plan.single.sort_unstable();
+                return;
+            };
+            let linear =
+                Linear::new(asset.source.len(), bands, lighting.channels(), lighting.order(), |i, to, b| {
+                    lighting.arriving(i, to, b)
+                });
+            let packed: Vec<f16> = linear.values.iter().map(|v| f16::from_f32(*v)).collect();
+            self.changed |= grow(device, &mut self.linear, "linear", 2 * packed.len() as u64);
+            queue.write_buffer(&self.linear, 0, bytemuck::cast_slice(&packed));
+            self.known = Some((ratio, Linear { values: Vec::new(), ..linear }));
+        }
+        let Some((_, linear)) = &self.known else { return };
+        let lights = self.plan.folded.iter().filter_map(|l| frame.lights.get(*l));
+        let ambient = Ambient::new(lights, asset.material.mean_cosine, frame.view.origin, linear.bands);
+        let vectors = ambient.values.len() / ambient.count;
+        let header = [ambient.count, vectors, linear.channels, 0].map(|n| f32::from_bits(n as u32));
+        let bytes: Vec<[f32; 4]> = std::iter::once(header).chain(ambient.values).collect();
+        self.changed |= grow(device, &mut self.ambient, "ambient", 16 * bytes.len() as u64);
+        queue.write_buffer(&self.ambient, 0, bytemuck::cast_slice(&bytes));
+    }
+
+    /// Error of the transmittance that folded lights see.
+    pub fn fold_error(&self) -> f32 {
+        self.known.as_ref().map_or(0.0, |(_, linear)| linear.error)
     }
 }
 

@@ -10,6 +10,7 @@ use wgpu::{
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Pass {
     Lighting,
+    Fold,
     Slopes,
     Surface,
     Boundary,
@@ -23,8 +24,9 @@ pub(super) enum Pass {
 pub(super) const PASSES: usize = Pass::ALL.len();
 
 impl Pass {
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 9] = [
         Self::Lighting,
+        Self::Fold,
         Self::Slopes,
         Self::Surface,
         Self::Boundary,
@@ -43,6 +45,7 @@ impl Pass {
     pub fn name(self) -> &'static str {
         match self {
             Self::Lighting => "lighting",
+            Self::Fold => "fold",
             Self::Slopes => "slopes",
             Self::Surface => "surface",
             Self::Boundary => "boundary",

@@ -37,12 +37,31 @@ pub(super) struct ViewUniform {
     pub alpha: f32,
     pub rays: u32,
     pub means: f32,
-    pub unused: [u32; 2],
+    pub first_scene_light: u32,
+    pub unused: u32,
+}
+
+/// What a frame's rays need to know about its lights.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct LightLayout {
+    /// Records that are evaluated at the samples.
+    pub single: u32,
+    /// Record of the scene's first light.
+    pub first_scene_light: u32,
+    /// Share of the lights that baked means serve.
+    pub means: f32,
 }
 
 impl ViewUniform {
     /// A frame's rays at `offset` inside the pixels of `tile`, which then hold `rays` rays.
-    pub fn new(frame: &Frame, diagonal: f32, tile: Tile, offset: [f32; 2], rays: u32, means: f32) -> Self {
+    pub fn new(
+        frame: &Frame,
+        diagonal: f32,
+        tile: Tile,
+        offset: [f32; 2],
+        rays: u32,
+        lights: LightLayout,
+    ) -> Self {
         let surface = &frame.surface;
         Self {
             origin: frame.view.origin,
@@ -50,7 +69,7 @@ impl ViewUniform {
             forward: frame.view.forward,
             height: frame.height,
             right: frame.view.right,
-            light_count: frame.lights.len() as u32,
+            light_count: lights.single,
             up: frame.view.up,
             scene_lights: frame.scene_lights as u32,
             tile_start: tile.start,
@@ -62,8 +81,9 @@ impl ViewUniform {
             specular: if surface.reflection { surface.specular as f32 } else { 0.0 },
             alpha: (surface.roughness as f32).max(crate::cpu::surface::LEAST_ROUGHNESS).powi(2),
             rays,
-            means,
-            unused: [0; 2],
+            means: lights.means,
+            first_scene_light: lights.first_scene_light,
+            unused: 0,
         }
     }
 }
@@ -230,7 +250,8 @@ mod tests {
             specular,
             alpha,
             rays,
-            means
+            means,
+            first_scene_light
         );
         mirrors!(
             MediumUniform,

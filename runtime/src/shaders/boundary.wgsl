@@ -60,7 +60,7 @@ fn highlight(meeting: Meeting, geometric: vec3f, direction: vec3f) -> vec3f {
     }
     var sum = vec3f(0.0);
     for (var l = 0u; l < view.scene_lights; l++) {
-        let arriving = incident(lights[l], point);
+        let arriving = incident(lights[view.first_scene_light + l], point);
         let cosine = dot(n, arriving.towards);
         if (cosine <= 0.0 || dot(geometric, arriving.towards) <= 0.0) {
             continue;

@@ -11,6 +11,7 @@ use diaphane_formats::phase::Phase;
 use diaphane_runtime::Error;
 use diaphane_runtime::cpu::CpuRenderer;
 use diaphane_runtime::exact::{DepthTracer, ExactDepths};
+use diaphane_runtime::fold::Plan;
 use diaphane_runtime::frame::Frame;
 use diaphane_runtime::gpu::{GpuDevice, GpuRenderer, Renderer, Request, SplatPath, instance};
 use diaphane_runtime::rendered::RayResult;
@@ -110,6 +111,40 @@ fn stored_transmittance_at_low_and_high_order() {
     for order in [1, 10] {
         let asset = Object { encoding: Encoding::Transmittance, order, spacing: 0.3, ..ball() }.build();
         compare_rays("transmittance", &asset, &Frame::new(&scene(outside()), &asset.info).unwrap(), None);
+    }
+}
+
+#[test]
+fn folded_lights() {
+    for (phase, extinction) in
+        [(Phase::Isotropic, [4.0; 3]), (Phase::HenyeyGreenstein { g: 0.25 }, [2.0, 5.0, 11.0])]
+    {
+        let asset = Object { extinction, phase, ..ball() }.build();
+        let mut scene = scene(scenes::far());
+        scenes::add_suns(&mut scene, 40);
+        let frame = Frame::new(&scene, &asset.info).unwrap();
+        assert_eq!(Plan::new(&frame, &asset.info, None).folded.len(), 41);
+        compare_rays("folded lights", &asset, &frame, None);
+    }
+}
+
+#[test]
+fn lighting_is_reused_while_the_camera_moves() {
+    for path in [SplatPath::Quads, SplatPath::Tiles] {
+        let asset = ball().build();
+        let Some(mut gpu) = gpu_with(&asset, path) else { return };
+        gpu.set_reuse(true);
+        let frame = Frame::new(&scene(outside()), &asset.info).unwrap();
+        let moved = Frame::new(&scene(level()), &asset.info).unwrap();
+        gpu.render(&frame, None).unwrap();
+        let kept = gpu.render(&moved, None).unwrap();
+        assert!(
+            kept.passes.iter().all(|(name, _)| *name != "lighting" && *name != "slopes"),
+            "{:?}",
+            kept.passes
+        );
+        let anew = gpu_with(&asset, path).unwrap().render(&moved, None).unwrap();
+        assert_eq!(kept.picture, anew.picture);
     }
 }
 

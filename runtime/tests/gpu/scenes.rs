@@ -1,5 +1,6 @@
 //! Cameras and lights around the objects, whose centre is at (10, -20, 5).
 
+use diaphane_formats::directions::even_directions;
 use diaphane_formats::scene::{Camera, ImageSize, Light, Scene, Surface};
 use glam::DVec3;
 
@@ -12,6 +13,11 @@ pub fn outside() -> Camera {
         up: DVec3::Y,
         vertical_fov_degrees: 36.0,
     }
+}
+
+/// The same from far away.
+pub fn far() -> Camera {
+    Camera { position: CENTRE + 4.0 * DVec3::new(0.7, 1.1, 3.4), vertical_fov_degrees: 9.0, ..outside() }
 }
 
 /// Looks along the plane of the torus.
@@ -59,4 +65,12 @@ pub fn scene(camera: Camera) -> Scene {
 pub fn put_light_inside(scene: &mut Scene) {
     let position = CENTRE + DVec3::new(0.1, 0.3, 0.2);
     scene.lights.push(Light::Point { position, intensity: DVec3::new(0.3, 0.2, 0.1) });
+}
+
+/// Adds directional lights in even directions.
+pub fn add_suns(scene: &mut Scene, count: usize) {
+    for (k, direction) in even_directions(count, 3).into_iter().enumerate() {
+        let irradiance = DVec3::new(0.02 * k as f64, 0.5 + 0.4 * direction.y, 0.3) / count as f64;
+        scene.lights.push(Light::Directional { direction, irradiance });
+    }
 }

@@ -2,6 +2,7 @@
 
 use anyhow::Result;
 use diaphane_formats::files;
+use diaphane_runtime::fold::LightCounts;
 use diaphane_runtime::frame::Frame;
 use diaphane_runtime::gpu::SplatPath;
 use diaphane_runtime::player::Player;
@@ -28,6 +29,8 @@ pub struct Stats {
     albedo: [f64; 3],
     /// Lights drawn, those that stand for the environment included.
     lights: usize,
+    /// What became of them in the last frame.
+    light_counts: LightCounts,
     /// Lights of the scene's list.
     scene_lights: usize,
     frames: u32,
@@ -78,6 +81,7 @@ impl Stats {
             extinction: player.info().extinction,
             albedo: player.info().albedo,
             lights: frame.lights.len(),
+            light_counts: LightCounts::default(),
             scene_lights: frame.scene_lights,
             frames,
             splats_per_pixel: 0.0,
@@ -96,6 +100,7 @@ impl Stats {
             self.pass_times.entry(name).or_default().push(*time);
         }
         self.counters = rendered.counters;
+        self.light_counts = rendered.lights;
         self.samples_drawn = rendered.counters.samples_drawn;
         self.splats_per_pixel = rendered.counters.splats_per_ray();
     }

@@ -5,9 +5,9 @@ struct View {
     forward: vec3f,         // unit
     height: u32,
     right: vec3f,           // half the image plane's width at distance 1
-    light_count: u32,
+    light_count: u32,       // lights that are evaluated at the samples: the first ones
     up: vec3f,              // half the image plane's height at distance 1
-    scene_lights: u32,      // the first lights make highlights, the rest stand for an environment
+    scene_lights: u32,      // lights that make highlights; the others stand for an environment
     tile_start: vec2u,      // column and row of the tile's first pixel
     tile_size: vec2u,       // columns and rows of the tile
     offset: vec2f,          // position of this ray inside its pixel, each in (0, 1)
@@ -18,6 +18,7 @@ struct View {
     alpha: f32,             // squared roughness
     rays: u32,              // rays of each pixel drawn so far, this one included
     means: f32,             // share of the lights whose values are means over a sample's cell
+    first_scene_light: u32, // of those that make highlights
 }
 
 @group(0) @binding(0) var<uniform> view: View;

@@ -1,0 +1,54 @@
+// Fold pass, only where lights are folded: adds what all of them together send towards the camera to each sample's value.
+// Twin of `cpu::lighting::from_folded`; crate::fold states the formulas.
+
+@group(1) @binding(0) var<storage, read> centroids: array<vec4f>;
+@group(1) @binding(1) var<storage, read> linear: array<u32>;      // [sample][channel][coefficient], two f16 a word
+// Coefficients, vectors, channels (bits); then F and, where the phase function minds the camera, its three changes.
+@group(1) @binding(2) var<storage, read> ambient: array<vec4f>;
+@group(1) @binding(3) var<storage, read_write> values: array<vec4f>;
+
+fn vector(v: u32, k: u32, count: u32) -> vec3f {
+    return ambient[1u + v * count + k].xyz;
+}
+
+@compute @workgroup_size(64)
+fn fold_lights(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) groups: vec3u) {
+    let sample = id.y * groups.x * 64u + id.x;
+    if (sample >= medium.samples) {
+        return;
+    }
+    let before = values[sample];
+    if (before.w <= 0.0) {
+        return;
+    }
+    let header = bitcast<vec4u>(ambient[0]);
+    let count = header.x;
+    let turned = header.y > 1u;
+    var deviation = vec3f(0.0);
+    if (turned) {
+        let away = view.origin - centroids[sample].xyz;
+        deviation = away / max(length(away), 1e-30) - view.origin / max(length(view.origin), 1e-30);
+    }
+    let words = count / 2u;
+    let start = sample * header.z * words;
+    var sum = vec3f(0.0);
+    for (var word = 0u; word < words; word++) {
+        let red = unpack2x16float(linear[start + word]);
+        var green = red;
+        var blue = red;
+        if (header.z > 1u) {
+            green = unpack2x16float(linear[start + words + word]);
+            blue = unpack2x16float(linear[start + 2u * words + word]);
+        }
+        for (var half = 0u; half < 2u; half++) {
+            let k = 2u * word + half;
+            var light = vector(0u, k, count);
+            if (turned) {
+                light += vector(1u, k, count) * deviation.x + vector(2u, k, count) * deviation.y
+                    + vector(3u, k, count) * deviation.z;
+            }
+            sum += light * vec3f(red[half], green[half], blue[half]);
+        }
+    }
+    values[sample] = vec4f(before.xyz + medium.albedo * max(sum, vec3f(0.0)), before.w);
+}
