@@ -16,6 +16,9 @@ pub enum Error {
     /// A change of the material that makes no sense.
     #[error("{0}")]
     Edit(String),
+    /// A host program asked for something that makes no sense.
+    #[error("{0}")]
+    Host(String),
     /// The GPU failed while drawing.
     #[error("the GPU failed: {0}")]
     Gpu(String),

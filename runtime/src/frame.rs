@@ -165,7 +165,7 @@ impl Frame {
     }
 }
 
-fn frame_light(light: &Light, centre: DVec3) -> FrameLight {
+pub(crate) fn frame_light(light: &Light, centre: DVec3) -> FrameLight {
     let local = |p: DVec3| (p - centre).as_vec3();
     let base = FrameLight {
         kind: LightKind::Point,
@@ -198,7 +198,7 @@ fn frame_light(light: &Light, centre: DVec3) -> FrameLight {
 
 /// The environment projected to [`ENVIRONMENT_ORDER`] bands of spherical harmonics, then evaluated in even directions, each a
 /// directional light with irradiance radiance × 4π / count.
-fn environment_lights(environment: &Environment) -> Vec<FrameLight> {
+pub fn environment_lights(environment: &Environment) -> Vec<FrameLight> {
     let coefficients = project_environment(environment);
     let directions = even_directions(ENVIRONMENT_DIRECTIONS, 0);
     let solid_angle = 4.0 * std::f64::consts::PI / directions.len() as f64;

@@ -13,6 +13,7 @@ pub mod fold;
 pub mod frame;
 pub mod framing;
 pub mod gpu;
+pub mod placement;
 pub mod player;
 pub mod rendered;
 pub mod usable;
@@ -20,3 +21,4 @@ pub mod usable;
 mod error;
 
 pub use error::{Error, Result};
+pub use wgpu;

@@ -22,22 +22,26 @@ pub(super) enum Slot {
     Write,
     /// A texture of f32 that is loaded from, not filtered.
     Texture,
+    /// A depth texture that is loaded from.
+    Depth,
 }
 
 impl Slot {
     fn binding_type(self) -> BindingType {
         let buffer =
             |ty, has_dynamic_offset| BindingType::Buffer { ty, has_dynamic_offset, min_binding_size: None };
+        let texture = |sample_type| BindingType::Texture {
+            sample_type,
+            view_dimension: TextureViewDimension::D2,
+            multisampled: false,
+        };
         match self {
             Self::Uniform => buffer(BufferBindingType::Uniform, false),
             Self::Moving => buffer(BufferBindingType::Uniform, true),
             Self::Read => buffer(BufferBindingType::Storage { read_only: true }, false),
             Self::Write => buffer(BufferBindingType::Storage { read_only: false }, false),
-            Self::Texture => BindingType::Texture {
-                sample_type: TextureSampleType::Float { filterable: false },
-                view_dimension: TextureViewDimension::D2,
-                multisampled: false,
-            },
+            Self::Texture => texture(TextureSampleType::Float { filterable: false }),
+            Self::Depth => texture(TextureSampleType::Depth),
         }
     }
 }

@@ -172,7 +172,7 @@ impl GpuRenderer {
                 }
             });
             for view in 0..offsets.len() {
-                submit(&mut self.timers, &|e, timers| self.renderer.record_ray(e, timers, view, tile));
+                submit(&mut self.timers, &|e, timers| self.renderer.record_ray(e, timers, view, tile, None));
             }
             self.read(tile, &mut milliseconds, &mut take)?;
         }

@@ -7,20 +7,22 @@
 //!           or splat resolve   the same by blended quads ([`SplatPath`])
 //! ```
 //!
-//! [`GpuRenderer`] owns its device and reads pictures back; [`Renderer`] records the same passes into a host's command
-//! buffer, with two more for the screen: publish (mean of the rays so far) and display (exposure). Boundary runs where `ior` is not 1, profile where the medium has a density grid. Later pieces of rays are
+//! [`GpuRenderer`] owns its device and reads pictures back; [`PictureRenderer`] records the same passes into a command buffer,
+//! with two more for a window: publish (mean of the rays so far) and display (exposure). [`Renderer`] draws many objects into
+//! a host program's frame, with passes that clip at its depth buffer, compose objects front to back and overlay its picture. Boundary runs where `ior` is not 1, profile where the medium has a density grid. Later pieces of rays are
 //! drawn indirectly and cost next to nothing where no ray has them. Sums are kept in 32-bit floats and added in the
 //! order of the samples: the same adapter draws the same bits every time.
 
 mod bindings;
 mod device;
 mod headless;
+mod host;
 mod neighbours;
 mod packed;
 mod passes;
+mod picture;
 mod pipeline;
 mod readback;
-mod renderer;
 mod scene;
 mod shaders;
 mod targets;
@@ -30,6 +32,7 @@ mod uniforms;
 
 pub use device::{GpuDevice, instance};
 pub use headless::GpuRenderer;
+pub use host::{AssetId, HostDepth, HostFrame, HostReport, InstanceId, Options, Renderer};
+pub use picture::{PictureRenderer, Request, Statistics};
 pub use pipeline::SplatPath;
 pub use readback::texture as read_texture;
-pub use renderer::{Renderer, Request, Statistics};

@@ -1,10 +1,14 @@
 //! The passes: pipelines, and the commands of each.
 
 pub(super) mod boundary;
+pub(super) mod clip;
+pub(super) mod compose;
 pub(super) mod display;
 pub(super) mod fold;
 pub(super) mod gather;
 pub(super) mod lighting;
+pub(super) mod limits;
+pub(super) mod overlay;
 pub(super) mod profile;
 pub(super) mod publish;
 pub(super) mod resolve;
@@ -37,6 +41,18 @@ impl Recorder<'_> {
     fn aim(common: &BindGroup, view_offset: u32, tile: [u32; 2], render: &mut wgpu::RenderPass<'_>) {
         render.set_viewport(0.0, 0.0, tile[0] as f32, tile[1] as f32, 0.0, 1.0);
         render.set_bind_group(0, common, &[view_offset]);
+    }
+
+    /// Runs a compute pass over the tile's pixels that no timer watches.
+    fn over_pixels(&mut self, label: &str, pipeline: &ComputePipeline, group: &BindGroup) {
+        let [x, y] = self.pixel_groups();
+        let mut compute = self
+            .encoder
+            .begin_compute_pass(&ComputePassDescriptor { label: Some(label), timestamp_writes: None });
+        compute.set_pipeline(pipeline);
+        compute.set_bind_group(0, self.common, &[self.view_offset]);
+        compute.set_bind_group(1, group, &[]);
+        compute.dispatch_workgroups(x, y, 1);
     }
 
     /// Runs a compute pass; `dispatch` starts its workgroups.

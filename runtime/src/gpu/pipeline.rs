@@ -2,6 +2,7 @@
 
 use super::passes::Recorder;
 use super::passes::boundary::Boundary;
+use super::passes::clip::Clip;
 use super::passes::fold::Fold;
 use super::passes::gather::Gather;
 use super::passes::lighting::Lighting;
@@ -64,6 +65,17 @@ impl SplatPath {
         Self::Tiles
     }
 
+    /// Itself where the device can take it.
+    ///
+    /// # Errors
+    /// Quads where 32-bit floats cannot be blended.
+    pub fn checked(self, device: &Device) -> Result<Self> {
+        if self == Self::Quads && !device.features().contains(Features::FLOAT32_BLENDABLE) {
+            return Err(Error::Gpu("the adapter cannot blend 32-bit floats, which quads need".to_owned()));
+        }
+        Ok(self)
+    }
+
     /// "quads" or "tiles".
     pub fn name(self) -> &'static str {
         match self {
@@ -74,6 +86,7 @@ impl SplatPath {
 }
 
 /// The passes of a [`SplatPath`].
+#[derive(Clone)]
 enum Splatting {
     Quads(Splat, Resolve),
     Tiles(Gather),
@@ -106,9 +119,7 @@ impl Pipeline {
     /// # Errors
     /// An asset that makes no sense or is too large for the device.
     pub fn new(device: &Device, asset: &Asset, path: SplatPath) -> Result<Self> {
-        if path == SplatPath::Quads && !device.features().contains(Features::FLOAT32_BLENDABLE) {
-            return Err(Error::Gpu("the adapter cannot blend 32-bit floats, which quads need".to_owned()));
-        }
+        let path = path.checked(device)?;
         let common = common_layout(device);
         let asset = AssetBuffers::new(device, asset)?;
         Ok(Self {
@@ -156,6 +167,13 @@ impl Pipeline {
         }
     }
 
+    /// The same for one instance, whose medium others share until now.
+    pub(super) fn set_own_material(&mut self, device: &Device, queue: &Queue, info: &Info) {
+        self.asset.own_medium(device);
+        self.frame.renew(device, &self.common, &self.asset);
+        self.set_material(device, queue, info);
+    }
+
     /// Uploads a frame's lights, and sees that there are targets for its tiles, which it returns.
     pub(super) fn begin(
         &mut self,
@@ -164,6 +182,31 @@ impl Pipeline {
         frame: &Frame,
         exact: Option<&ExactDepths>,
     ) -> Result<Vec<Tile>> {
+        let key = self.light(device, queue, frame, exact)?;
+        let tiles =
+            split(frame.width, frame.height, budget(device, self.asset.pixel_state(), self.most_memory))?;
+        // The first tile is the largest; `split` returns at least one.
+        let fits = self.targets.as_ref().is_some_and(|(t, _)| t.size == tiles[0].size);
+        if !fits || self.frame.take_changed() {
+            let old = self.targets.take().map(|(t, _)| t).filter(|_| fits);
+            let targets =
+                old.unwrap_or_else(|| Targets::new(device, self.asset.pixel_state(), tiles[0], self.path()));
+            let groups = self.groups(device, &targets);
+            self.targets = Some((targets, groups));
+        }
+        self.lit = Some(key);
+        Ok(tiles)
+    }
+
+    /// Uploads a frame's lights where they need other sources. The key that comes back is to be kept in `lit` when all went
+    /// well.
+    fn light(
+        &mut self,
+        device: &Device,
+        queue: &Queue,
+        frame: &Frame,
+        exact: Option<&ExactDepths>,
+    ) -> Result<LightingKey> {
         let key = LightingKey::new(frame, &self.asset.info, exact);
         self.relight = !self.reuse || self.lit.as_ref() != Some(&key);
         // Not before all went well.
@@ -171,17 +214,48 @@ impl Pipeline {
         if self.relight {
             self.frame.write_lights(device, queue, &self.asset, frame, exact)?;
         }
-        let tiles = split(frame.width, frame.height, budget(device, &self.asset, self.most_memory))?;
-        // The first tile is the largest; `split` returns at least one.
-        let fits = self.targets.as_ref().is_some_and(|(t, _)| t.size == tiles[0].size);
-        if !fits || self.frame.take_changed() {
-            let old = self.targets.take().map(|(t, _)| t).filter(|_| fits);
-            let targets = old.unwrap_or_else(|| Targets::new(device, &self.asset, tiles[0], self.path()));
-            let groups = self.groups(device, &targets);
-            self.targets = Some((targets, groups));
+        Ok(key)
+    }
+
+    /// The same object once more, with lights and sources of its own.
+    pub(super) fn instance(&self, device: &Device) -> Self {
+        let asset = self.asset.instance(device);
+        Self {
+            common: self.common.clone(),
+            lighting: self.lighting.clone(),
+            fold: self.fold.clone(),
+            slopes: self.slopes.clone(),
+            surface: self.surface.clone(),
+            boundary: self.boundary.clone(),
+            segments: self.segments.clone(),
+            profile: self.profile.clone(),
+            splatting: self.splatting.clone(),
+            frame: FrameBuffers::new(device, &self.common, &asset),
+            reuse: true,
+            lit: None,
+            relight: true,
+            asset,
+            targets: None,
+            most_memory: self.most_memory,
+        }
+    }
+
+    /// As [`Self::begin`] with targets that others use too, large enough for what is to be drawn.
+    pub(super) fn begin_in(
+        &mut self,
+        device: &Device,
+        queue: &Queue,
+        frame: &Frame,
+        targets: &Targets,
+    ) -> Result<()> {
+        let key = self.light(device, queue, frame, None)?;
+        let stale = self.targets.as_ref().is_none_or(|(known, _)| known.pieces != targets.pieces);
+        if self.frame.take_changed() || stale {
+            let groups = self.groups(device, targets);
+            self.targets = Some((targets.clone(), groups));
         }
         self.lit = Some(key);
-        Ok(tiles)
+        Ok(())
     }
 
     /// Uploads the rays of some tiles: view `t * offsets.len() + o` is offset o in tile t, added to pictures of `before`
@@ -236,9 +310,9 @@ impl Pipeline {
         self.targets.as_ref().map(|(t, _)| t)
     }
 
-    /// Records the lighting of all samples.
-    pub(super) fn record_lighting(&self, encoder: &mut CommandEncoder, timers: &mut Timers) {
-        let Some((_, groups)) = &self.targets else { return };
+    /// Records the lighting of all samples where they need it; says whether they do.
+    pub(super) fn record_lighting(&self, encoder: &mut CommandEncoder, timers: &mut Timers) -> bool {
+        let Some((_, groups)) = &self.targets else { return false };
         if self.asset.sample_count > 0 && self.relight {
             let mut r =
                 Recorder { encoder, timers, common: self.frame.common(), view_offset: 0, tile: [0; 2] };
@@ -248,6 +322,7 @@ impl Pipeline {
             }
             self.slopes.record(&mut r, &groups.slopes, &self.asset);
         }
+        self.relight
     }
 
     /// Records the start of a tile: an empty picture.
@@ -264,6 +339,7 @@ impl Pipeline {
         timers: &mut Timers,
         view: usize,
         tile: Tile,
+        clip: Option<(&Clip, &BindGroup)>,
     ) {
         let Some((targets, groups)) = &self.targets else {
             return;
@@ -274,6 +350,9 @@ impl Pipeline {
             boundary.record(r, group, &self.asset, targets);
         }
         self.segments.record(r, &groups.segments, targets);
+        if let Some((clip, group)) = clip {
+            clip.record(r, group);
+        }
         for (k, piece) in groups.pieces.iter().enumerate() {
             if let (Some(profile), Some(group)) = (&self.profile, &piece.profile) {
                 profile.record(r, group, targets, k);

@@ -3,6 +3,7 @@
 use super::bindings::{Slot, empty_buffer, filled_buffer, group, layout};
 use super::neighbours::neighbours;
 use super::packed;
+use super::targets::PixelState;
 use super::uniforms::{LightRecord, MediumUniform, ViewUniform};
 use crate::cpu::lighting::Lighting;
 use crate::cpu::surface::corner_normals;
@@ -17,9 +18,11 @@ use diaphane_formats::slopes::{NEIGHBOURS, Stencil};
 use diaphane_formats::{kernel, sh};
 use glam::Vec3;
 use half::f16;
+use std::sync::Arc;
 use wgpu::{BindGroup, BindGroupLayout, Buffer, BufferBinding, BufferUsages, Device, Queue, ShaderStages};
 
 /// Everything that stays as long as the asset does.
+#[derive(Clone)]
 pub(super) struct AssetBuffers {
     pub medium: Buffer,
     /// What [`Self::medium`] holds.
@@ -51,7 +54,7 @@ pub(super) struct AssetBuffers {
     /// As they are played.
     pub info: Info,
     /// Kept for the transmittance of folded lights.
-    source: Samples,
+    source: Arc<Samples>,
     /// Of the grid; 1 without.
     most_density: f32,
     /// Of the widest kernel.
@@ -154,7 +157,7 @@ impl AssetBuffers {
                 BufferUsages::UNIFORM | BufferUsages::COPY_DST,
             ),
             material,
-            source: samples,
+            source: Arc::new(samples),
         })
     }
 
@@ -163,6 +166,24 @@ impl AssetBuffers {
         self.material.set_material(info, self.heterogeneous);
         self.info = info.clone();
         queue.write_buffer(&self.medium, 0, bytemuck::bytes_of(&self.material));
+    }
+
+    /// The same object once more, with values and sources of its own.
+    pub fn instance(&self, device: &Device) -> Self {
+        let own =
+            |label: &str, like: &Buffer| empty_buffer(device, label, like.size(), BufferUsages::STORAGE);
+        Self { values: own("values", &self.values), sources: own("sources", &self.sources), ..self.clone() }
+    }
+
+    /// Gives this instance a medium of its own.
+    pub fn own_medium(&mut self, device: &Device) {
+        let usage = BufferUsages::UNIFORM | BufferUsages::COPY_DST;
+        self.medium = filled_buffer(device, "medium", &[self.material], usage);
+    }
+
+    /// What it keeps for a pixel.
+    pub fn pixel_state(&self) -> PixelState {
+        PixelState { fresnel: self.fresnel, heterogeneous: self.heterogeneous }
     }
 
     /// The code that the material needs.
@@ -281,6 +302,11 @@ impl FrameBuffers {
             means: 1.0,
             first_scene_light: 0,
         }
+    }
+
+    /// Binds another medium.
+    pub fn renew(&mut self, device: &Device, common: &BindGroupLayout, asset: &AssetBuffers) {
+        self.common = common_group(device, common, &self.views, &asset.medium);
     }
 
     /// The shared group; set it with an offset of [`VIEW_STRIDE`] times the view's index.

@@ -44,6 +44,10 @@ macro_rules! gather {
 pub(super) const GATHER_BY_LANES: &str = gather!("gather_lanes");
 pub(super) const GATHER_PLAINLY: &str = gather!("gather_plain");
 
+pub(super) const LIMITS: &str = source!("limits");
+pub(super) const CLIP: &str = source!("shared/view", "clip");
+pub(super) const COMPOSE: &str = source!("shared/view", "compose");
+pub(super) const OVERLAY: &str = source!("overlay");
 pub(super) const PUBLISH: &str = source!("shared/view", "publish");
 pub(super) const DISPLAY: &str = source!("display");
 

@@ -2,7 +2,6 @@
 
 use super::bindings::empty_buffer;
 use super::pipeline::SplatPath;
-use super::scene::AssetBuffers;
 use super::tiles::{Budget, Tile};
 use crate::rendered::MAX_PIECES;
 use diaphane_formats::reconstruct::PROFILE_CELLS;
@@ -32,6 +31,7 @@ const CELL: u64 = 8;
 const PROFILE: u64 = 16 * (PROFILE_CELLS as u64 + 1);
 
 /// Buffers and textures for a tile of a given number of columns and rows.
+#[derive(Clone)]
 pub(super) struct Targets {
     pub size: [u32; 2],
     /// Pixels, padded so that each piece's part starts at a multiple of 256 bytes.
@@ -52,11 +52,30 @@ pub(super) struct Targets {
     pub denominator: TextureView,
 }
 
+/// What objects keep for a pixel beside what all do.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct PixelState {
+    /// The boundary reflects.
+    pub fresnel: bool,
+    /// The density varies.
+    pub heterogeneous: bool,
+}
+
+impl PixelState {
+    /// Enough for both.
+    pub fn or(self, other: Self) -> Self {
+        Self {
+            fresnel: self.fresnel || other.fresnel,
+            heterogeneous: self.heterogeneous || other.heterogeneous,
+        }
+    }
+}
+
 /// How large tiles may be.
-pub(super) fn budget(device: &Device, asset: &AssetBuffers, total: u64) -> Budget {
+pub(super) fn budget(device: &Device, state: PixelState, total: u64) -> Budget {
     let limits = device.limits();
-    let profile = if asset.heterogeneous { PROFILE } else { 0 };
-    let boundary = if asset.fresnel { BOUNDARY } else { 0 };
+    let profile = if state.heterogeneous { PROFILE } else { 0 };
+    let boundary = if state.fresnel { BOUNDARY } else { 0 };
     let pieces = PIECE * MAX_PIECES as u64;
     Budget {
         side: limits.max_texture_dimension_2d,
@@ -70,7 +89,7 @@ pub(super) fn budget(device: &Device, asset: &AssetBuffers, total: u64) -> Budge
 
 impl Targets {
     /// Targets for tiles up to the size of `tile`.
-    pub fn new(device: &Device, asset: &AssetBuffers, tile: Tile, path: SplatPath) -> Self {
+    pub fn new(device: &Device, needs: PixelState, tile: Tile, path: SplatPath) -> Self {
         let pixels = tile.pixels();
         let stride = pixels.next_multiple_of(16);
         let cell_stride =
@@ -97,12 +116,12 @@ impl Targets {
             size: tile.size,
             stride,
             crossings: buffer("crossings", CROSSINGS * pixels, state),
-            boundary: buffer("boundary", if asset.fresnel { BOUNDARY * pixels } else { 0 }, state),
+            boundary: buffer("boundary", if needs.fresnel { BOUNDARY * pixels } else { 0 }, state),
             pieces: buffer("pieces", PIECE * MAX_PIECES as u64 * stride, read),
             front: buffer("front", 16 * pixels, state),
             radiance: buffer("radiance", 16 * pixels, read),
             counters: buffer("counters", 16 * pixels, read),
-            profile: buffer("profile", if asset.heterogeneous { PROFILE * stride } else { 0 }, state),
+            profile: buffer("profile", if needs.heterogeneous { PROFILE * stride } else { 0 }, state),
             arguments: buffer("arguments", ARGUMENTS * MAX_PIECES as u64, state | BufferUsages::INDIRECT),
             cells: buffer("cells", CELL * MAX_PIECES as u64 * cell_stride, state),
             cell_stride,

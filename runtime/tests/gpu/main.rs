@@ -2,6 +2,7 @@
 //! DIAPHANE_REQUIRE_GPU=1 asks them to fail.
 
 mod edits;
+mod host;
 mod objects;
 mod scenes;
 
@@ -13,7 +14,7 @@ use diaphane_runtime::cpu::CpuRenderer;
 use diaphane_runtime::exact::{DepthTracer, ExactDepths};
 use diaphane_runtime::fold::Plan;
 use diaphane_runtime::frame::Frame;
-use diaphane_runtime::gpu::{GpuDevice, GpuRenderer, Renderer, Request, SplatPath, instance};
+use diaphane_runtime::gpu::{GpuDevice, GpuRenderer, PictureRenderer, Request, SplatPath, instance};
 use diaphane_runtime::rendered::RayResult;
 use objects::{Object, ball, torus, uneven_grid};
 use scenes::{inside, level, outside, scene};
@@ -284,7 +285,7 @@ fn a_host_program_gets_the_same_picture() {
     let expected = gpu.render(&frame, None).unwrap();
     let host = GpuDevice::open(&instance(), None).unwrap();
     let (device, queue) = (&host.device, &host.queue);
-    let mut renderer = Renderer::new(device, queue, &asset, TextureFormat::Rgba8Unorm).unwrap();
+    let mut renderer = PictureRenderer::new(device, queue, &asset, TextureFormat::Rgba8Unorm).unwrap();
     // One ray first, then the other three on top.
     for rays in [0..1, 1..4] {
         let mut encoder = device.create_command_encoder(&Default::default());

@@ -10,6 +10,7 @@ use super::surface::{draw_mesh, mesh_pipeline};
 use wgpu::{BindGroup, BindGroupLayout, Device, RenderPipeline, ShaderStages};
 
 /// See boundary.wgsl.
+#[derive(Clone)]
 pub(crate) struct Boundary {
     layout: BindGroupLayout,
     pipeline: RenderPipeline,

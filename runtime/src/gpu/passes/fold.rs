@@ -8,6 +8,7 @@ use super::Recorder;
 use wgpu::{BindGroup, BindGroupLayout, ComputePipeline, Device, ShaderStages};
 
 /// See fold.wgsl.
+#[derive(Clone)]
 pub(crate) struct Fold {
     layout: BindGroupLayout,
     pipeline: ComputePipeline,

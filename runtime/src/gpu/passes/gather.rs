@@ -12,6 +12,7 @@ use wgpu::{
 };
 
 /// See gather.wgsl.
+#[derive(Clone)]
 pub(crate) struct Gather {
     layout: BindGroupLayout,
     pipeline_layout: PipelineLayout,

@@ -9,6 +9,7 @@ use diaphane_formats::harmonics;
 use wgpu::{BindGroup, BindGroupLayout, ComputePipeline, Device, ShaderStages};
 
 /// See lighting.wgsl.
+#[derive(Clone)]
 pub(crate) struct Lighting {
     layout: BindGroupLayout,
     pipeline: ComputePipeline,

@@ -9,6 +9,7 @@ use super::Recorder;
 use wgpu::{BindGroup, BindGroupLayout, ComputePipeline, Device, ShaderStages};
 
 /// See profile.wgsl.
+#[derive(Clone)]
 pub(crate) struct Profile {
     layout: BindGroupLayout,
     pipeline: ComputePipeline,

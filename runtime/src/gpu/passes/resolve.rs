@@ -9,6 +9,7 @@ use super::Recorder;
 use wgpu::{BindGroup, BindGroupLayout, BindingResource, ComputePipeline, Device, ShaderStages};
 
 /// See resolve.wgsl.
+#[derive(Clone)]
 pub(crate) struct Resolve {
     layout: BindGroupLayout,
     pipeline: ComputePipeline,

@@ -9,6 +9,7 @@ use super::Recorder;
 use wgpu::{BindGroup, BindGroupLayout, ComputePipeline, Device, ShaderStages};
 
 /// See segments.wgsl.
+#[derive(Clone)]
 pub(crate) struct Segments {
     layout: BindGroupLayout,
     pipeline: ComputePipeline,

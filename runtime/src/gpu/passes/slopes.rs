@@ -8,6 +8,7 @@ use super::Recorder;
 use wgpu::{BindGroup, BindGroupLayout, ComputePipeline, Device, ShaderStages};
 
 /// See slopes.wgsl.
+#[derive(Clone)]
 pub(crate) struct Slopes {
     layout: BindGroupLayout,
     pipeline: ComputePipeline,

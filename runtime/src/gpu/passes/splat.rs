@@ -20,6 +20,7 @@ const ADD: BlendComponent = BlendComponent {
 };
 
 /// See splat.wgsl.
+#[derive(Clone)]
 pub(crate) struct Splat {
     layout: BindGroupLayout,
     pipeline_layout: PipelineLayout,

@@ -14,6 +14,7 @@ use wgpu::{
 };
 
 /// See surface.wgsl.
+#[derive(Clone)]
 pub(crate) struct Surface {
     layout: BindGroupLayout,
     pipeline: RenderPipeline,

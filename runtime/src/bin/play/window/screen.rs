@@ -3,7 +3,7 @@
 use anyhow::{Context, Result, anyhow};
 use diaphane_formats::asset::{Asset, Info};
 use diaphane_runtime::Error;
-use diaphane_runtime::gpu::{GpuDevice, Renderer, Request, instance, read_texture};
+use diaphane_runtime::gpu::{GpuDevice, PictureRenderer, Request, instance, read_texture};
 use egui::{ClippedPrimitive, TexturesDelta};
 use egui_wgpu::{RendererOptions, ScreenDescriptor};
 use std::sync::Arc;
@@ -26,7 +26,7 @@ const FORMATS: [TextureFormat; 4] = [
 pub struct Screen {
     pub window: Arc<Window>,
     pub gpu: GpuDevice,
-    pub renderer: Renderer,
+    pub renderer: PictureRenderer,
     surface: Surface<'static>,
     config: SurfaceConfiguration,
     panel: egui_wgpu::Renderer,
@@ -74,7 +74,7 @@ impl Screen {
         config.format = format;
         config.present_mode = PresentMode::AutoVsync;
         surface.configure(&gpu.device, &config);
-        let renderer = Renderer::new(&gpu.device, &gpu.queue, asset, format)?;
+        let renderer = PictureRenderer::new(&gpu.device, &gpu.queue, asset, format)?;
         let panel = egui_wgpu::Renderer::new(&gpu.device, format, RendererOptions::default());
         gpu.check()?;
         Ok(Self { window, gpu, renderer, surface, config, panel })

@@ -46,7 +46,7 @@ pub struct Statistics {
 }
 
 /// Draws one asset with a device that somebody else owns, which needs `FLOAT32_BLENDABLE`.
-pub struct Renderer {
+pub struct PictureRenderer {
     passes: Pipeline,
     publish: Publish,
     display: Display,
@@ -77,7 +77,7 @@ struct Pending {
 
 const FAILED: u32 = 1 << 16;
 
-impl Renderer {
+impl PictureRenderer {
     /// Compiles the passes for targets of a format, and uploads an asset.
     ///
     /// # Errors
@@ -140,7 +140,7 @@ impl Renderer {
             }
             let views = t * offsets.len()..(t + 1) * offsets.len();
             for view in views.clone() {
-                self.passes.record_ray(encoder, timers, view, tile);
+                self.passes.record_ray(encoder, timers, view, tile, None);
             }
             // The last view knows how many rays the picture has now.
             if let (Some(view), Some(targets)) = (views.last(), self.passes.targets()) {

@@ -1,0 +1,403 @@
+//! The renderer for programs that own device, targets and frame: many objects beside their own opaque geometry.
+//!
+//! ```text
+//! host: opaque geometry -> colour, depth
+//! prepare: [limits] then, object by object from the front: lighting .. segments [clip] gather, compose
+//! render: overlay in the host's render pass
+//! ```
+//!
+//! Objects attenuate what lies behind them, the host's colours and each other, and cast no shadows on each other. They are
+//! ordered by the distance of their centres; where two run through each other the nearer one counts as in front altogether.
+
+use super::bindings::empty_buffer;
+use super::passes::clip::Clip;
+use super::passes::compose::Compose;
+use super::passes::limits::Limits;
+use super::passes::overlay::Overlay;
+use super::pipeline::{Pipeline, SplatPath};
+use super::scene::common_layout;
+use super::targets::{PixelState, TOTAL, Targets, budget};
+use super::tiles::{Tile, split};
+use super::timers::Timers;
+use crate::edit::Edit;
+use crate::frame::{Frame, FrameLight};
+use crate::placement::{HostCamera, Placement, covered};
+use crate::{Error, Result};
+use diaphane_formats::asset::{Asset, Info};
+use diaphane_formats::scene::{Light, Surface};
+use glam::Mat4;
+use wgpu::{
+    BindGroup, Buffer, BufferUsages, Color, CommandEncoder, Device, LoadOp, Operations, Queue, RenderPass,
+    RenderPassColorAttachment, RenderPassDescriptor, StoreOp, TextureFormat, TextureView,
+};
+
+/// The targets of a host's render pass.
+#[derive(Clone, Copy, Debug)]
+pub struct Options {
+    /// Of the colour attachment; radiance times exposure is written as it is, so a format of floats keeps it all.
+    pub colour: TextureFormat,
+    /// Of the depth attachment, if the pass has one; it is neither read nor written there.
+    pub depth: Option<TextureFormat>,
+    /// Samples of both.
+    pub sample_count: u32,
+    /// How kernels are summed; `None`: whichever suits the device.
+    pub path: Option<SplatPath>,
+}
+
+impl Options {
+    /// A colour attachment alone, one sample.
+    pub fn new(colour: TextureFormat) -> Self {
+        Self { colour, depth: None, sample_count: 1, path: None }
+    }
+}
+
+/// An asset of a [`Renderer`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct AssetId(usize);
+
+/// An object of a [`Renderer`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct InstanceId(usize);
+
+/// A host's depth buffer: a texture view with the aspect depth, one sample, of the picture's size, that can be bound; and the
+/// projection that it was drawn with.
+#[derive(Clone, Copy, Debug)]
+pub struct HostDepth<'a> {
+    /// What shaders may read.
+    pub view: &'a TextureView,
+    /// From the eye to clip space.
+    pub projection: Mat4,
+}
+
+/// One frame of a host.
+#[derive(Clone, Copy, Debug)]
+pub struct HostFrame<'a> {
+    /// Columns and rows.
+    pub size: [u32; 2],
+    /// Where it is seen from.
+    pub camera: HostCamera,
+    /// Lights in the world.
+    pub lights: &'a [Light],
+    /// An environment as [`crate::frame::environment_lights`] makes it.
+    pub environment: &'a [FrameLight],
+    /// How surfaces reflect lights.
+    pub surface: Surface,
+    /// What hides objects.
+    pub depth: Option<HostDepth<'a>>,
+    /// Factor on the radiance.
+    pub exposure: f32,
+}
+
+/// What a frame took.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct HostReport {
+    /// Objects drawn.
+    pub drawn: usize,
+    /// Objects out of sight.
+    pub culled: usize,
+    /// Objects whose samples were lit anew.
+    pub lit: usize,
+    /// Tiles of all objects.
+    pub tiles: usize,
+    /// Whether the last picture still holds, so that nothing was recorded.
+    pub reused: bool,
+}
+
+struct Instance {
+    asset: usize,
+    placement: Placement,
+    pipeline: Pipeline,
+}
+
+/// Buffers of the size of the picture.
+struct Picture {
+    size: [u32; 2],
+    total: Buffer,
+    opaque: Buffer,
+    distances: Buffer,
+    overlay: BindGroup,
+}
+
+/// What the last picture shows.
+#[derive(PartialEq)]
+struct Seen {
+    frames: Vec<Frame>,
+    exposure: f32,
+}
+
+/// Draws assets with a device that somebody else owns. No feature is needed; `SUBGROUP` makes it faster.
+pub struct Renderer {
+    overlay: Overlay,
+    compose: Compose,
+    clip: Clip,
+    limits: Limits,
+    path: SplatPath,
+    assets: Vec<Option<Pipeline>>,
+    instances: Vec<Option<Instance>>,
+    targets: Option<(Targets, PixelState)>,
+    picture: Option<Picture>,
+    seen: Option<Seen>,
+    report: HostReport,
+}
+
+/// An object that is in sight.
+struct Visible {
+    instance: usize,
+    frame: Frame,
+    tiles: Vec<Tile>,
+}
+
+impl Renderer {
+    /// Compiles what all objects share.
+    ///
+    /// # Errors
+    /// Quads where the device cannot blend 32-bit floats.
+    pub fn new(device: &Device, options: Options) -> Result<Self> {
+        let common = common_layout(device);
+        Ok(Self {
+            overlay: Overlay::new(device, &options),
+            compose: Compose::new(device, &common),
+            clip: Clip::new(device, &common),
+            limits: Limits::new(device),
+            path: options.path.unwrap_or_else(|| SplatPath::best(device)).checked(device)?,
+            assets: Vec::new(),
+            instances: Vec::new(),
+            targets: None,
+            picture: None,
+            seen: None,
+            report: HostReport::default(),
+        })
+    }
+
+    /// Uploads an asset.
+    ///
+    /// # Errors
+    /// An asset that makes no sense or is too large for the device.
+    pub fn add_asset(&mut self, device: &Device, asset: &Asset) -> Result<AssetId> {
+        self.assets.push(Some(Pipeline::new(device, asset, self.path)?));
+        Ok(AssetId(self.assets.len() - 1))
+    }
+
+    /// Forgets an asset and all its instances.
+    pub fn remove_asset(&mut self, id: AssetId) {
+        if let Some(asset) = self.assets.get_mut(id.0) {
+            *asset = None;
+        }
+        self.instances
+            .iter_mut()
+            .filter(|i| i.as_ref().is_some_and(|i| i.asset == id.0))
+            .for_each(|i| *i = None);
+        self.seen = None;
+    }
+
+    /// Puts an asset somewhere.
+    ///
+    /// # Errors
+    /// An asset that is not there, a placement that makes no sense.
+    pub fn add_instance(
+        &mut self,
+        device: &Device,
+        asset: AssetId,
+        placement: Placement,
+    ) -> Result<InstanceId> {
+        placement.validate()?;
+        let pipeline = self.assets.get(asset.0).and_then(Option::as_ref).ok_or_else(|| missing("asset"))?;
+        let pipeline = pipeline.instance(device);
+        self.seen = None;
+        self.instances.push(Some(Instance { asset: asset.0, placement, pipeline }));
+        Ok(InstanceId(self.instances.len() - 1))
+    }
+
+    /// Puts an object somewhere else.
+    ///
+    /// # Errors
+    /// An object that is not there, a placement that makes no sense.
+    pub fn place(&mut self, id: InstanceId, placement: Placement) -> Result<()> {
+        placement.validate()?;
+        self.instance_mut(id)?.placement = placement;
+        Ok(())
+    }
+
+    /// Gives an object another extinction and albedo, relative to those that were baked.
+    ///
+    /// # Errors
+    /// An object that is not there, values out of range.
+    pub fn edit(&mut self, device: &Device, queue: &Queue, id: InstanceId, edit: &Edit) -> Result<()> {
+        let asset = self.instance_mut(id)?.asset;
+        let baked = self.assets.get(asset).and_then(Option::as_ref).ok_or_else(|| missing("asset"))?;
+        let info = edit.apply(&baked.asset.info)?;
+        self.instance_mut(id)?.pipeline.set_own_material(device, queue, &info);
+        self.seen = None;
+        Ok(())
+    }
+
+    /// Takes an object away.
+    pub fn remove_instance(&mut self, id: InstanceId) {
+        if let Some(instance) = self.instances.get_mut(id.0) {
+            *instance = None;
+        }
+        self.seen = None;
+    }
+
+    fn instance_mut(&mut self, id: InstanceId) -> Result<&mut Instance> {
+        self.instances.get_mut(id.0).and_then(Option::as_mut).ok_or_else(|| missing("object"))
+    }
+
+    /// What the last frame took.
+    pub fn report(&self) -> HostReport {
+        self.report
+    }
+
+    /// Records all passes of a frame but the overlay. Call it when the commands before it have drawn the depth buffer.
+    ///
+    /// # Errors
+    /// A picture without pixels or too large for the device; lights that are.
+    pub fn prepare(
+        &mut self,
+        device: &Device,
+        queue: &Queue,
+        encoder: &mut CommandEncoder,
+        host: &HostFrame<'_>,
+    ) -> Result<()> {
+        let bytes = 16 * u64::from(host.size[0]) * u64::from(host.size[1]);
+        let limits = device.limits();
+        let most = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
+        if bytes == 0 || bytes > most {
+            let [w, h] = host.size;
+            return Err(Error::Host(format!("a picture of {w} x {h} pixels does not fit the device")));
+        }
+        let (visible, report) = self.visible(device, host)?;
+        self.report = report;
+        // A depth buffer may have changed without a word.
+        let frames = visible.iter().map(|v| v.frame.clone()).collect();
+        let seen = host.depth.is_none().then_some(Seen { frames, exposure: host.exposure });
+        let fits = self.picture.as_ref().is_some_and(|p| p.size == host.size);
+        if fits && seen.is_some() && self.seen == seen {
+            self.report = HostReport { reused: true, tiles: 0, ..self.report };
+            return Ok(());
+        }
+        self.seen = None;
+        if !fits {
+            self.picture = Some(self.new_picture(device, host.size));
+        }
+        self.overlay.write(queue, host.size, host.exposure);
+        self.fit_targets(device, &visible);
+        let (Some(picture), Some((targets, _))) = (&self.picture, &self.targets) else { return Ok(()) };
+        encoder.clear_buffer(&picture.total, 0, None);
+        encoder.clear_buffer(&picture.opaque, 0, None);
+        if let Some(depth) = host.depth {
+            let depth = (depth.view, depth.projection);
+            self.limits.record(device, encoder, host.size, depth, &picture.distances);
+        }
+        let compose = self.compose.bind(device, targets, &picture.total, &picture.opaque);
+        let timers = &mut Timers::off();
+        for Visible { instance, frame, tiles } in &visible {
+            let Some(instance) = &mut self.instances[*instance] else { continue };
+            let pipeline = &mut instance.pipeline;
+            pipeline.begin_in(device, queue, frame, targets)?;
+            pipeline.write_views(device, queue, frame, tiles, &[[0.5; 2]], 0);
+            self.report.lit += usize::from(pipeline.record_lighting(encoder, timers));
+            let clip = host.depth.map(|_| {
+                let per_unit = (1.0 / instance.placement.scale) as f32;
+                self.clip.bind(device, &picture.distances, targets, per_unit, host.size[0])
+            });
+            for (view, tile) in tiles.iter().enumerate() {
+                pipeline.record_start(encoder);
+                let clip = clip.as_ref().map(|group| (&self.clip, group));
+                pipeline.record_ray(encoder, timers, view, *tile, clip);
+                self.compose.record(&mut pipeline.recorder(encoder, timers, view, *tile), &compose);
+            }
+        }
+        self.seen = seen;
+        Ok(())
+    }
+
+    /// Draws the picture over the colours of the pass's viewport.
+    pub fn render(&self, pass: &mut RenderPass<'_>) {
+        if let Some(picture) = &self.picture {
+            self.overlay.draw(pass, &picture.overlay);
+        }
+    }
+
+    /// The same in a pass of its own: over black and transparent where `clear` says so, else over what is there. The target has
+    /// the format of [`Options::colour`]; options with a depth attachment or several samples need [`Self::render`].
+    pub fn render_to_texture(&self, encoder: &mut CommandEncoder, target: &TextureView, clear: bool) {
+        let load = if clear { LoadOp::Clear(Color::TRANSPARENT) } else { LoadOp::Load };
+        let mut pass = encoder.begin_render_pass(&RenderPassDescriptor {
+            label: Some("diaphane"),
+            color_attachments: &[Some(RenderPassColorAttachment {
+                view: target,
+                depth_slice: None,
+                resolve_target: None,
+                ops: Operations { load, store: StoreOp::Store },
+            })],
+            depth_stencil_attachment: None,
+            timestamp_writes: None,
+            occlusion_query_set: None,
+            multiview_mask: None,
+        });
+        self.render(&mut pass);
+    }
+
+    /// Objects in sight, the nearest first.
+    fn visible(&self, device: &Device, host: &HostFrame<'_>) -> Result<(Vec<Visible>, HostReport)> {
+        let mut report = HostReport::default();
+        let mut visible = Vec::new();
+        for (index, instance) in self.instances.iter().enumerate() {
+            let Some(Instance { placement, pipeline, .. }) = instance else { continue };
+            let info: &Info = &pipeline.asset.info;
+            let HostFrame { size, lights, environment, surface, .. } = *host;
+            let frame = host.camera.frame(size, lights, environment, surface, placement, info);
+            let Some([low, high]) = covered(&frame, info) else {
+                report.culled += 1;
+                continue;
+            };
+            let budget = budget(device, pipeline.asset.pixel_state(), TOTAL);
+            let mut tiles = split(high[0] - low[0], high[1] - low[1], budget)?;
+            tiles.iter_mut().for_each(|t| t.start = [t.start[0] + low[0], t.start[1] + low[1]]);
+            report.drawn += 1;
+            report.tiles += tiles.len();
+            let distance = host.camera.distance(placement.centre(info));
+            visible.push((distance, Visible { instance: index, frame, tiles }));
+        }
+        visible.sort_by(|a, b| a.0.total_cmp(&b.0));
+        Ok((visible.into_iter().map(|(_, v)| v).collect(), report))
+    }
+
+    /// Sees that the targets hold the largest tile and all that objects keep.
+    fn fit_targets(&mut self, device: &Device, visible: &[Visible]) {
+        let mut needed = Tile { start: [0; 2], size: [1; 2] };
+        let mut state = PixelState::default();
+        for v in visible {
+            for tile in &v.tiles {
+                (0..2).for_each(|c| needed.size[c] = needed.size[c].max(tile.size[c]));
+            }
+            if let Some(instance) = &self.instances[v.instance] {
+                state = state.or(instance.pipeline.asset.pixel_state());
+            }
+        }
+        if let Some((targets, known)) = &self.targets {
+            let fits = (0..2).all(|c| targets.size[c] >= needed.size[c]) && known.or(state) == *known;
+            if fits {
+                return;
+            }
+            state = state.or(*known);
+            (0..2).for_each(|c| needed.size[c] = needed.size[c].max(targets.size[c]));
+        }
+        self.targets = Some((Targets::new(device, state, needed, self.path), state));
+    }
+
+    fn new_picture(&self, device: &Device, size: [u32; 2]) -> Picture {
+        let pixels = u64::from(size[0]) * u64::from(size[1]);
+        let usage = BufferUsages::STORAGE | BufferUsages::COPY_DST;
+        let total = empty_buffer(device, "total", 16 * pixels, usage);
+        let opaque = empty_buffer(device, "opaque", 16 * pixels, usage);
+        let distances = empty_buffer(device, "distances", 4 * pixels, usage);
+        let overlay = self.overlay.bind(device, &total, &opaque);
+        Picture { size, total, opaque, distances, overlay }
+    }
+}
+
+fn missing(what: &str) -> Error {
+    Error::Host(format!("the {what} was removed or belongs to another renderer"))
+}
