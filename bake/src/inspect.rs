@@ -1,5 +1,6 @@
 //! `diaphane-bake inspect`.
 
+use diaphane_bake::report;
 use diaphane_formats::asset::{self, Asset, Certificate};
 use diaphane_formats::files;
 use serde_json::{Value, json};
@@ -28,6 +29,7 @@ fn describe(asset: &Asset, sections: &[(&'static str, usize)], bytes: usize) -> 
         "bytes_per_sample": bytes_per_sample(asset, sections),
         "sections": sizes,
         "diagonal": asset.info.diagonal(),
+        "levels": report::levels(asset),
         "info": asset.info,
     })
 }
@@ -85,6 +87,9 @@ fn print_text(path: &Path, asset: &Asset, sections: &[(&'static str, usize)], by
         "  samples      {} ({} dropped as dark), {} directions, at most {} bands, {:?}, width factor {}",
         i.samples, i.discarded, p.directions, i.order, i.encoding, i.width_factor
     );
+    for (k, level) in report::levels(asset).iter().enumerate().skip(1) {
+        println!("  level {k:<7}{} samples, width factor {}", level.samples, level.width_factor);
+    }
     println!("  error        {}", certified(i.certificate.as_ref()));
     println!("  per sample   {:.1} bytes", bytes_per_sample(asset, sections));
     for (name, size) in sections {

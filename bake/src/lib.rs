@@ -1,7 +1,7 @@
 //! Bakes a translucent mesh: thesis chapter 3, algorithms 1 and 2.
 //!
 //! ```text
-//! mesh ─ field ─ layers ─ density ─ samples ─ (refine) ─ fit (optical depth, harmonics, weights) ─ pack ─ certificate ─ asset
+//! mesh ─ field ─ layers ─ density ─ samples ─ (refine) ─ fit (optical depth, harmonics) ─ levels (weights) ─ pack ─ certificate ─ asset
 //! ```
 //!
 //! A stage imports only the stages before it; [`pipeline`] runs them, [`cache`] remembers what they made. Nothing here prints; progress and cancellation go through
@@ -15,6 +15,7 @@ mod error;
 mod field;
 mod fit;
 mod layers;
+mod levels;
 mod measure;
 pub mod memory;
 mod pack;

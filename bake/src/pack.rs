@@ -4,7 +4,7 @@ use crate::fit::{Light, boundary_order};
 use crate::params::Params;
 use crate::samples::Candidate;
 use crate::{Input, Result};
-use diaphane_formats::asset::{Asset, DensityGrid, Info, Provenance, Samples};
+use diaphane_formats::asset::{Asset, DensityGrid, Info, Level, Provenance, Samples};
 use diaphane_formats::medium::{Density, Medium, SampledDensity};
 use glam::DVec3;
 use half::f16;
@@ -24,7 +24,7 @@ pub(crate) fn pack(
     params: &Params,
     placed: Stand<'_>,
     light: Light,
-    weight: Vec<f32>,
+    (weight, levels): (Vec<f32>, Vec<Level>),
 ) -> Result<Asset> {
     let (low, high) = input.mesh.bounds();
     let centre = input.mesh.centre();
@@ -75,6 +75,7 @@ pub(crate) fn pack(
             lobe: light.lobe,
             boundary: light.boundary,
         },
+        levels,
         mesh_positions: input.mesh.positions.iter().map(|p| local(*p)).collect(),
         mesh_triangles: input.mesh.triangles.clone(),
         density: density_grid(medium, sampled, centre),

@@ -1,7 +1,7 @@
 //! The stages of one bake, each of whose results the cache may hold.
 //!
 //! ```text
-//! distance field ─ samples ─ optical depth, harmonics (block by block) ─ light ─ weights ─ packing ─ certificate
+//! distance field ─ samples ─ optical depth, harmonics (block by block) ─ light ─ levels, weights ─ packing ─ certificate
 //! ```
 
 use crate::cache::{Cache, Key};
@@ -15,7 +15,7 @@ use crate::progress::Timed;
 use crate::refine::{self, Bench};
 use crate::report::{Facts, Refinement, Report};
 use crate::samples::{Candidate, Ground, Placed};
-use crate::{Error, Input, Prepared, Result, blocks, density, layers, samples};
+use crate::{Error, Input, Prepared, Result, blocks, density, layers, levels, samples};
 use diaphane_formats::asset::Asset;
 use serde::{Deserialize, Serialize};
 use std::cell::OnceCell;
@@ -99,17 +99,18 @@ impl<'a> Pipeline<'a> {
         let lighting = self.cache.get(&keys.lighting, || self.light(&keys, &placed.samples))?;
         let samples: Vec<Candidate> = kept(&placed.samples, &lighting.keep);
         let discarded = placed.samples.len() - samples.len();
-        let weights = Key::new("weights", &(&keys.depths, placing.width_factor))?;
-        let weights = self.cache.get(&weights, || {
-            let middle = self.input.mesh.centre();
-            self.timed
-                .stage("weights", |p| fit::weights(&samples, middle, &placed.probes, params.width_factor, p))
+        let nested = Key::new("weights", &(&keys.depths, placing.width_factor))?;
+        let nested = self.cache.get(&nested, || {
+            levels::nest(self.input.mesh, &samples, &placed.probes, params.width_factor, self.timed)
         })?;
+        let samples = nested.arranged(&samples);
         let Lighting { light, offset, exact, buried, dark, .. } = lighting;
+        let (light, offset) = (light.picked(&nested.order), nested.arranged(&offset));
+        let exact: Vec<Vec<f32>> = exact.iter().map(|arriving| nested.arranged(arriving)).collect();
         let sampled = self.medium()?.sampled.as_ref();
         let mut asset = self.timed.stage("packing", |_| {
             let stand = Stand { samples: &samples, offset, discarded };
-            pack::pack(self.input, sampled, &params, stand, light, weights)
+            pack::pack(self.input, sampled, &params, stand, light, nested.weights())
         })?;
         if params.certificate {
             let key = Key::new("certificate", &(&keys.lighting, placing.width_factor))?;

@@ -23,11 +23,28 @@ pub struct Refinement {
     pub width_factor: f32,
 }
 
+/// A level of detail.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct LevelSize {
+    /// The first so many of the asset's samples.
+    pub samples: usize,
+    /// Of their kernels, in disk radii.
+    pub width_factor: f32,
+}
+
+/// The levels of an asset, that of all samples first.
+pub fn levels(asset: &Asset) -> Vec<LevelSize> {
+    let size = |(samples, width_factor)| LevelSize { samples, width_factor };
+    asset.level_sizes().into_iter().map(size).collect()
+}
+
 /// The report of one bake.
 #[derive(Clone, Debug, Serialize)]
 pub struct Report {
     /// Stored samples.
     pub samples: usize,
+    /// Levels of detail, that of all samples first.
+    pub levels: Vec<LevelSize>,
     /// Directions for each sample.
     pub directions: usize,
     /// Bands of spherical harmonics.
@@ -118,6 +135,7 @@ impl Report {
         let rays = facts.placed.samples.len() * params.points_per_sample * directions;
         Self {
             samples: found,
+            levels: levels(asset),
             directions,
             sh_order: params.order,
             rays: rays as u64,

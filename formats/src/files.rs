@@ -1,7 +1,7 @@
 //! Opening and writing files: only regular files are read, and a file appears under its name only when complete.
 
 use crate::{Error, Result};
-use std::io::Write;
+use std::io::{Read, Write};
 use std::path::Path;
 
 /// Reads a whole regular file. Anything else (folder, device, pipe) is refused, so that a path from a file of a
@@ -9,6 +9,16 @@ use std::path::Path;
 pub fn read(path: &Path) -> Result<Vec<u8>> {
     require_regular(path)?;
     std::fs::read(path).map_err(|e| Error::io("read", path, e))
+}
+
+/// Reads the first `length` bytes of a regular file, fewer where it has no more.
+pub fn read_front(path: &Path, length: usize) -> Result<Vec<u8>> {
+    require_regular(path)?;
+    let fail = |e| Error::io("read", path, e);
+    let file = std::fs::File::open(path).map_err(fail)?;
+    let mut front = Vec::new();
+    file.take(length as u64).read_to_end(&mut front).map_err(fail)?;
+    Ok(front)
 }
 
 /// Reads a whole regular file as UTF-8 text.

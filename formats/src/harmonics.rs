@@ -195,6 +195,25 @@ impl Harmonics {
             .collect()
     }
 
+    /// The functions of these numbers, in this order; numbers of functions that are not there are left out.
+    pub fn picked(&self, numbers: impl IntoIterator<Item = usize>) -> Self {
+        let starts = self.starts();
+        let mut out = Self { profile: self.profile.clone(), ..Self::default() };
+        for i in numbers {
+            let (Some(order), Some(scale), Some(start)) =
+                (self.order.get(i), self.scale.get(i), starts.get(i))
+            else {
+                continue;
+            };
+            if let Some(codes) = self.codes.get(*start..start + bytes(usize::from(*order))) {
+                out.order.push(*order);
+                out.scale.push(*scale);
+                out.codes.extend_from_slice(codes);
+            }
+        }
+        out
+    }
+
     /// Coefficients as plain numbers.
     pub fn decoded(&self) -> Coefficients {
         let mut out = Coefficients::zeros(self.order.clone());

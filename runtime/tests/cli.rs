@@ -38,6 +38,27 @@ fn play(folder: &Path, arguments: &[&str]) -> Output {
 }
 
 #[test]
+fn plays_one_level() {
+    let folder = folder("level");
+    let mut ball = asset::read(&folder.join("ball.dph")).unwrap();
+    let weight = vec![1.0; ball.samples.len() / 4];
+    ball.levels.push(asset::Level { width_factor: 2.2, weight });
+    asset::write(&folder.join("ball.dph"), &ball).unwrap();
+    let arguments = ["ball.dph", "--scene", "a.scene.toml", "--backend", "cpu", "--output", "o.exr"];
+    let level = |k: &str| play(&folder, &[&arguments[..], &["--stats", "s.json", "--level", k]].concat());
+    for (k, samples) in [("0", ball.samples.len()), ("1", ball.samples.len() / 4)] {
+        let done = level(k);
+        assert!(done.status.success(), "{done:?}");
+        let text = std::fs::read_to_string(folder.join("s.json")).unwrap();
+        let stats: serde_json::Value = serde_json::from_str(&text).unwrap();
+        assert_eq!(stats["samples"], samples);
+    }
+    let none = level("2");
+    assert_eq!(none.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&none.stderr).contains("no level 2"), "{none:?}");
+}
+
+#[test]
 fn writes_picture_and_statistics() {
     let folder = folder("writes");
     let arguments = ["ball.dph", "--scene", "a.scene.toml", "--backend", "cpu", "--frames", "3"];

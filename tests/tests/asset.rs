@@ -3,7 +3,7 @@
 #[path = "support/workbench.rs"]
 mod workbench;
 
-use diaphane_formats::asset::{Asset, encode, parse, section_sizes};
+use diaphane_formats::asset::{Asset, encode, parse, parse_level, section_sizes};
 use diaphane_formats::medium::{Density, Grid, Medium};
 use diaphane_formats::phase::Phase;
 use glam::DVec3;
@@ -80,8 +80,9 @@ proptest! {
     #[test]
     fn any_bytes_are_survived(bytes in proptest::collection::vec(any::<u8>(), 0..400)) {
         prop_assert!(parse(&bytes).is_err());
-        let mut headed = b"DIAPHANE\x02\x00\x00\x00".to_vec();
+        let mut headed = b"DIAPHANE\x04\x00\x00\x00".to_vec();
         headed.extend(&bytes);
         prop_assert!(parse(&headed).is_err());
+        prop_assert!(parse_level(&headed, 1).is_err());
     }
 }

@@ -35,6 +35,17 @@ impl Light {
         let boundary = if boundary_order == 0 { Harmonics::default() } else { dark(boundary_order) };
         Self { encoding: Encoding::RECIPROCAL, depth: dark(1), lobe: Vec::new(), boundary }
     }
+
+    /// That of these samples, in this order.
+    pub fn picked(&self, numbers: &[u32]) -> Self {
+        let numbers = || numbers.iter().map(|i| *i as usize);
+        Self {
+            encoding: self.encoding,
+            depth: self.depth.picked(numbers()),
+            lobe: numbers().filter_map(|i| self.lobe.get(i).copied()).collect(),
+            boundary: self.boundary.picked(numbers()),
+        }
+    }
 }
 
 /// The fits of some samples, in their order.

@@ -76,7 +76,8 @@ impl Trial {
         let offset = cells.offsets(&placed.samples);
         let stand = Stand { samples: &placed.samples, offset, discarded: 0 };
         let light = Light::none(placed.samples.len(), boundary_order(medium.ior(), params.order));
-        let asset = pack(bench.input, bench.medium.sampled.as_ref(), params, stand, light, weight)?;
+        let asset =
+            pack(bench.input, bench.medium.sampled.as_ref(), params, stand, light, (weight, Vec::new()))?;
         let player = Player::new(&asset, &self.views);
         stage.announce(LIGHTS);
         let lights: Vec<(DVec3, usize)> = self.lights.iter().enumerate().map(|(l, d)| (*d, l % 3)).collect();

@@ -7,14 +7,16 @@ mod certificate;
 mod codec;
 mod container;
 mod info;
+mod levels;
 mod places;
 mod read;
 mod write;
 
 pub use certificate::{Certificate, CertifiedError};
 pub use info::{Info, Provenance};
+pub use levels::{Level, MAX_LEVELS};
 pub use places::Places;
-pub use read::{parse, read, section_sizes};
+pub use read::{parse, parse_level, read, read_level, section_sizes};
 pub use write::{encode, write};
 
 use crate::harmonics::Harmonics;
@@ -25,7 +27,7 @@ use glam::{DVec3, Vec3};
 use half::f16;
 
 /// Version of the file format that this build writes and reads.
-pub const FORMAT_VERSION: u32 = 3;
+pub const FORMAT_VERSION: u32 = 4;
 
 /// Set in a sample's stored number of bands where it has a lobe.
 const HAS_LOBE: u8 = 0x80;
@@ -35,8 +37,10 @@ const HAS_LOBE: u8 = 0x80;
 pub struct Asset {
     /// Parameters, medium and provenance.
     pub info: Info,
-    /// The samples, in no particular order.
+    /// The samples: those of the coarsest level first, then what each finer one adds.
     pub samples: Samples,
+    /// The coarser levels of detail, the finest of them first; may be none.
+    pub levels: Vec<Level>,
     /// Boundary mesh: vertex positions relative to the centre.
     pub mesh_positions: Vec<[f32; 3]>,
     /// Boundary mesh: triangles.
@@ -156,6 +160,7 @@ impl Asset {
         {
             return fail("sample values");
         }
+        levels::validate(&self.levels, n)?;
         self.mesh()?;
         if let Some(grid) = &self.density {
             let count = grid.size.iter().try_fold(1usize, |a, &n| a.checked_mul(n as usize));

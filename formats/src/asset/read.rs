@@ -1,7 +1,8 @@
 //! Bytes to asset. Survives any byte string; allocates no more than a small multiple of the file's size.
 
-use super::container::{self, Kind, Section};
-use super::{Asset, DensityGrid, FORMAT_VERSION, HAS_LOBE, Info, Places, Samples, codec};
+use super::container::{Kind, SHARED, Section, Table};
+use super::levels::no_level;
+use super::{Asset, DensityGrid, FORMAT_VERSION, HAS_LOBE, Info, Level, Places, Samples, codec};
 use crate::harmonics::Harmonics;
 use crate::{Error, Result, files, lobe};
 use glam::Vec3;
@@ -18,67 +19,170 @@ pub fn read(path: &Path) -> Result<Asset> {
 
 /// As [`read`], from the file's bytes.
 pub fn parse(bytes: &[u8]) -> Result<Asset> {
-    let sections = container::open(bytes, FORMAT_VERSION)?;
-    let find = |kind: Kind| optional(&sections, kind);
-    let need = |kind: Kind| {
-        find(kind)?.ok_or_else(|| Error::invalid(format!("the asset lacks its section {}", kind as u32)))
-    };
-    let info: Info = codec::decode(need(Kind::Info)?)?;
-    let places = Places::new(info.bounds);
-    let (offset, bands): (Vec<[i8; 4]>, Vec<u8>) = groups(need(Kind::Offset)?)?
-        .into_iter()
-        .map(|[x, y, z, bands]: [u8; 4]| ([x as i8, y as i8, z as i8, 0], bands))
-        .unzip();
-    let lobes = find(Kind::Lobe)?.map(words).transpose()?;
-    let halves_of = |kind: Kind| find(kind)?.map_or(Ok(Vec::new()), halves);
-    let floats_of = |kind: Kind| find(kind)?.map_or(Ok(Vec::new()), floats);
-    let boundary_scale = halves_of(Kind::BoundaryScale)?;
-    let boundary_order = u8::try_from(info.boundary_order).unwrap_or(u8::MAX);
-    let asset = Asset {
-        samples: Samples {
-            position_radius: place(need(Kind::Place)?, &places)?,
-            offset,
-            weight: halves(need(Kind::Weight)?)?.into_iter().map(f16::to_f32).collect(),
-            depth: Harmonics {
-                order: bands.iter().map(|b| b & !HAS_LOBE).collect(),
-                scale: halves(need(Kind::DepthScale)?)?,
-                profile: floats(need(Kind::DepthProfile)?)?,
-                codes: need(Kind::Depth)?.to_vec(),
-            },
-            lobe: lobes.map_or(Ok(Vec::new()), |codes| spread(&codes, &bands))?,
-            boundary: Harmonics {
-                order: vec![boundary_order; boundary_scale.len()],
-                scale: boundary_scale,
-                profile: floats_of(Kind::BoundaryProfile)?,
-                codes: find(Kind::Boundary)?.map_or(Vec::new(), <[u8]>::to_vec),
-            },
-        },
-        info,
-        mesh_positions: groups(&floats(need(Kind::MeshPositions)?)?)?,
-        mesh_triangles: groups(&words(need(Kind::MeshTriangles)?)?)?,
-        density: find(Kind::Density)?.map(density).transpose()?,
-    };
-    asset.validate()?;
-    Ok(asset)
+    let table = Table::read(bytes, FORMAT_VERSION)?;
+    table.require_whole(bytes)?;
+    let all = table.parts();
+    Parts { sections: table.sections(bytes, all)?, last: all, all }.asset()
 }
 
-/// Names and bytes of the sections of a file, in order.
+/// Reads one level of detail, the same as [`Asset::level`] of the whole, from no more of the file's front than it needs.
+/// What comes after that is neither read nor checked and may be missing.
+///
+/// # Errors
+/// As [`read`]; no such level.
+pub fn read_level(path: &Path, level: usize) -> Result<Asset> {
+    let in_file = |e: Error| e.in_file(path);
+    let head = files::read_front(path, Table::MOST)?;
+    let (table, last) = find_level(&head, level).map_err(in_file)?;
+    let front = files::read_front(path, table.front(last))?;
+    parse_level(&front, level).map_err(in_file)
+}
+
+/// As [`read_level`], from the file's bytes or from those at its front.
+///
+/// # Errors
+/// As [`read_level`].
+pub fn parse_level(bytes: &[u8], level: usize) -> Result<Asset> {
+    let (table, last) = find_level(bytes, level)?;
+    let parts = Parts { sections: table.sections(bytes, last)?, last, all: table.parts() };
+    Ok(Asset { levels: Vec::new(), ..parts.asset()? })
+}
+
+/// The table, and the last part of a level.
+fn find_level(bytes: &[u8], level: usize) -> Result<(Table, u16)> {
+    let table = Table::read(bytes, FORMAT_VERSION)?;
+    let all = table.parts();
+    let part =
+        u16::try_from(level).ok().and_then(|level| all.checked_sub(level)).filter(|part| *part > SHARED);
+    part.map(|part| (table, part)).ok_or_else(|| no_level(level, usize::from(all)))
+}
+
+/// Bytes of the sections of each kind, in order of their first one.
 ///
 /// # Errors
 /// As [`read`].
 pub fn section_sizes(bytes: &[u8]) -> Result<Vec<(&'static str, usize)>> {
-    let sections = container::open(bytes, FORMAT_VERSION)?;
-    let name = |kind: u32| Kind::ALL.iter().find(|(k, _)| *k as u32 == kind).map_or("unknown", |(_, n)| *n);
-    Ok(sections.iter().map(|s| (name(s.kind), s.data.len())).collect())
+    let table = Table::read(bytes, FORMAT_VERSION)?;
+    table.require_whole(bytes)?;
+    let name = |kind: u16| Kind::ALL.iter().find(|(k, _)| *k as u16 == kind).map_or("unknown", |(_, n)| *n);
+    let mut sizes: Vec<(&str, usize)> = Vec::new();
+    for section in table.sections(bytes, table.parts())? {
+        let name = name(section.kind);
+        match sizes.iter_mut().find(|(n, _)| *n == name) {
+            Some((_, size)) => *size += section.data.len(),
+            None => sizes.push((name, section.data.len())),
+        }
+    }
+    Ok(sizes)
 }
 
-fn optional<'a>(sections: &[Section<'a>], kind: Kind) -> Result<Option<&'a [u8]>> {
-    let mut found = sections.iter().filter(|s| s.kind == kind as u32);
-    let first = found.next();
-    if found.next().is_some() {
-        return Err(Error::invalid(format!("the asset has section {} twice", kind as u32)));
+/// Bytes of a sample's place.
+const PLACE: usize = 8;
+
+/// Sections of some parts of a file.
+struct Parts<'a> {
+    sections: Vec<Section<'a>>,
+    /// The last of these parts.
+    last: u16,
+    /// The last one of the file.
+    all: u16,
+}
+
+impl<'a> Parts<'a> {
+    fn find(&self, kind: Kind, part: u16) -> Result<Option<&'a [u8]>> {
+        let mut found = self.sections.iter().filter(|s| s.kind == kind as u16 && s.part == part);
+        let first = found.next();
+        if found.next().is_some() {
+            return Err(Error::invalid(format!("the asset has section {} twice", kind as u16)));
+        }
+        Ok(first.map(|s| s.data))
     }
-    Ok(first.map(|s| s.data))
+
+    fn need(&self, kind: Kind, part: u16) -> Result<&'a [u8]> {
+        let lacks = || Error::invalid(format!("the asset lacks its section {}", kind as u16));
+        self.find(kind, part)?.ok_or_else(lacks)
+    }
+
+    /// All parts of samples one after the other; nothing where a part has no such section.
+    fn joined(&self, kind: Kind) -> Result<Vec<u8>> {
+        let parts = (1..=self.last).filter_map(|part| self.find(kind, part).transpose());
+        Ok(parts.collect::<Result<Vec<_>>>()?.concat())
+    }
+
+    fn weight(&self, part: u16) -> Result<Vec<f32>> {
+        Ok(halves(self.need(Kind::Weight, part)?)?.into_iter().map(f16::to_f32).collect())
+    }
+
+    /// The coarser ones of the levels that end with these parts, the finest of them first.
+    fn levels(&self, widths: &[f32]) -> Result<Vec<Level>> {
+        let mut samples = 0;
+        let mut levels = Vec::new();
+        for (part, width_factor) in (1..self.last).zip(widths) {
+            let weight = self.weight(part)?;
+            samples += self.need(Kind::Place, part)?.len() / PLACE;
+            if samples != weight.len() {
+                return Err(Error::invalid("the asset's levels of detail and samples do not fit together"));
+            }
+            levels.push(Level { width_factor: *width_factor, weight });
+        }
+        levels.reverse();
+        Ok(levels)
+    }
+
+    fn samples(&self, info: &Info) -> Result<Samples> {
+        let (offset, bands): (Vec<[i8; 4]>, Vec<u8>) = groups(&self.joined(Kind::Offset)?)?
+            .into_iter()
+            .map(|[x, y, z, bands]: [u8; 4]| ([x as i8, y as i8, z as i8, 0], bands))
+            .unzip();
+        let has_lobes = self.find(Kind::Lobe, self.last)?.is_some();
+        let lobes = words(&self.joined(Kind::Lobe)?)?;
+        let boundary_scale = halves(&self.joined(Kind::BoundaryScale)?)?;
+        let boundary_order = u8::try_from(info.boundary_order).unwrap_or(u8::MAX);
+        let boundary_profile = self.find(Kind::BoundaryProfile, SHARED)?;
+        Ok(Samples {
+            position_radius: place(&self.joined(Kind::Place)?, &Places::new(info.bounds))?,
+            offset,
+            weight: self.weight(self.last)?,
+            depth: Harmonics {
+                order: bands.iter().map(|b| b & !HAS_LOBE).collect(),
+                scale: halves(&self.joined(Kind::DepthScale)?)?,
+                profile: floats(self.need(Kind::DepthProfile, SHARED)?)?,
+                codes: self.joined(Kind::Depth)?,
+            },
+            lobe: if has_lobes { spread(&lobes, &bands)? } else { Vec::new() },
+            boundary: Harmonics {
+                order: vec![boundary_order; boundary_scale.len()],
+                scale: boundary_scale,
+                profile: boundary_profile.map_or(Ok(Vec::new()), floats)?,
+                codes: self.joined(Kind::Boundary)?,
+            },
+        })
+    }
+
+    fn asset(&self) -> Result<Asset> {
+        let mut info: Info = codec::decode(self.need(Kind::Info, SHARED)?)?;
+        let widths = self.find(Kind::LevelWidth, SHARED)?.map_or(Ok(Vec::new()), floats)?;
+        if widths.len() + 1 != usize::from(self.all) {
+            return Err(Error::invalid("the asset's levels of detail and their widths do not fit together"));
+        }
+        let samples = self.samples(&info)?;
+        // A coarser level: the metadata are those of all samples.
+        if let Some(width_factor) = widths.get(usize::from(self.last) - 1) {
+            info.samples = samples.len() as u64;
+            info.width_factor = *width_factor;
+            info.certificate = None;
+        }
+        let asset = Asset {
+            info,
+            samples,
+            levels: self.levels(&widths)?,
+            mesh_positions: groups(&floats(self.need(Kind::MeshPositions, SHARED)?)?)?,
+            mesh_triangles: groups(&words(self.need(Kind::MeshTriangles, SHARED)?)?)?,
+            density: self.find(Kind::Density, SHARED)?.map(density).transpose()?,
+        };
+        asset.validate()?;
+        Ok(asset)
+    }
 }
 
 fn ragged() -> Error {
@@ -91,9 +195,9 @@ fn words(bytes: &[u8]) -> Result<Vec<u32>> {
 }
 
 fn place(bytes: &[u8], places: &Places) -> Result<Vec<[f32; 4]>> {
-    let (chunks, []) = bytes.as_chunks::<8>() else { return Err(ragged()) };
-    let word = |c: &[u8; 8], k: usize| u16::from_le_bytes([c[2 * k], c[2 * k + 1]]);
-    let one = |c: &[u8; 8]| {
+    let (chunks, []) = bytes.as_chunks::<PLACE>() else { return Err(ragged()) };
+    let word = |c: &[u8; PLACE], k: usize| u16::from_le_bytes([c[2 * k], c[2 * k + 1]]);
+    let one = |c: &[u8; PLACE]| {
         let [x, y, z] = places.position([0, 1, 2].map(|k| word(c, k))).to_array();
         [x, y, z, places.radius(f16::from_bits(word(c, 3)))]
     };

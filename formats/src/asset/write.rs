@@ -1,10 +1,12 @@
 //! Asset to bytes.
 
-use super::container::{self, Kind};
-use super::{Asset, FORMAT_VERSION, HAS_LOBE, Places, codec};
+use super::container::{self, Draft, Kind, SHARED};
+use super::{Asset, FORMAT_VERSION, HAS_LOBE, Places, Samples, codec};
+use crate::harmonics::Harmonics;
 use crate::{Result, files, lobe};
 use glam::Vec3;
 use half::f16;
+use std::ops::Range;
 use std::path::Path;
 
 /// The file's bytes: the same for the same asset, always.
@@ -13,50 +15,92 @@ use std::path::Path;
 /// Parts that do not fit together.
 pub fn encode(asset: &Asset) -> Result<Vec<u8>> {
     asset.validate()?;
-    let halves = |values: &[f16]| -> Vec<u8> { values.iter().flat_map(|v| v.to_le_bytes()).collect() };
-    let floats =
-        |values: &mut dyn Iterator<Item = f32>| -> Vec<u8> { values.flat_map(f32::to_le_bytes).collect() };
+    let mut sections = shared(asset)?;
+    let coarsest_first = asset.levels.iter().rev().map(|l| &l.weight).chain([&asset.samples.weight]);
+    let starts = [&asset.samples.depth, &asset.samples.boundary].map(ends);
+    let mut from = 0;
+    for (part, weight) in (1..).zip(coarsest_first) {
+        let range = from..weight.len();
+        from = range.end;
+        let own = samples(&asset.samples, &Places::new(asset.info.bounds), &starts, range, weight);
+        sections.extend(own.into_iter().map(|(kind, data)| Draft { kind, part, data }));
+    }
+    Ok(container::assemble(FORMAT_VERSION, &sections))
+}
+
+fn halves(values: impl Iterator<Item = f16>) -> Vec<u8> {
+    values.flat_map(f16::to_le_bytes).collect()
+}
+
+fn floats(values: impl Iterator<Item = f32>) -> Vec<u8> {
+    values.flat_map(f32::to_le_bytes).collect()
+}
+
+/// Where each function's codes start, and where the last one's end.
+fn ends(harmonics: &Harmonics) -> Vec<usize> {
+    let mut starts = harmonics.starts();
+    starts.push(harmonics.codes.len());
+    starts
+}
+
+/// What every level needs.
+fn shared(asset: &Asset) -> Result<Vec<Draft>> {
     let s = &asset.samples;
-    let places = Places::new(asset.info.bounds);
+    let mut sections = vec![(Kind::Info, codec::encode(&asset.info)?)];
+    if !asset.levels.is_empty() {
+        sections.push((Kind::LevelWidth, floats(asset.levels.iter().rev().map(|l| l.width_factor))));
+    }
+    sections.push((Kind::DepthProfile, floats(s.depth.profile.iter().copied())));
+    if !s.boundary.is_empty() {
+        sections.push((Kind::BoundaryProfile, floats(s.boundary.profile.iter().copied())));
+    }
+    sections.push((Kind::MeshPositions, floats(asset.mesh_positions.iter().flatten().copied())));
+    let corners = asset.mesh_triangles.iter().flatten();
+    sections.push((Kind::MeshTriangles, corners.flat_map(|i| i.to_le_bytes()).collect()));
+    if let Some(grid) = &asset.density {
+        let mut bytes: Vec<u8> = grid.size.iter().flat_map(|n| n.to_le_bytes()).collect();
+        bytes.extend(floats(grid.min.iter().chain(&grid.max).copied()));
+        bytes.extend(halves(grid.values.iter().flatten().copied()));
+        sections.push((Kind::Density, bytes));
+    }
+    Ok(sections.into_iter().map(|(kind, data)| Draft { kind, part: SHARED, data }).collect())
+}
+
+/// The samples of `range`, and the weights of all samples of the level that ends with them. `starts` are those of the
+/// depth's and the boundary's codes.
+fn samples(
+    s: &Samples,
+    places: &Places,
+    [depth, boundary]: &[Vec<usize>; 2],
+    range: Range<usize>,
+    weight: &[f32],
+) -> Vec<(Kind, Vec<u8>)> {
     let place = |p: &[f32; 4]| {
         let [x, y, z] = places.code(Vec3::new(p[0], p[1], p[2]).as_dvec3());
         [x, y, z, places.radius_code(f64::from(p[3])).to_bits()].map(u16::to_le_bytes)
     };
-    let lobes: Vec<u32> = s.lobe.iter().map(|a| lobe::code(*a)).collect();
-    let mark = |i: usize| if lobes.get(i).is_some_and(|code| *code != 0) { HAS_LOBE } else { 0 };
-    let offset =
-        |(i, (o, order)): (usize, (&[i8; 4], &u8))| [o[0] as u8, o[1] as u8, o[2] as u8, *order | mark(i)];
-    let weight: Vec<f16> = s.weight.iter().map(|w| f16::from_f32(*w)).collect();
+    let lobe_of = |i: usize| s.lobe.get(i).map_or(0, |a| lobe::code(*a));
+    let offset = |i: usize| {
+        let (o, mark) = (s.offset[i], if lobe_of(i) == 0 { 0 } else { HAS_LOBE });
+        [o[0] as u8, o[1] as u8, o[2] as u8, s.depth.order[i] | mark]
+    };
+    let codes = |h: &Harmonics, starts: &[usize]| h.codes[starts[range.start]..starts[range.end]].to_vec();
     let mut sections = vec![
-        (Kind::Info, codec::encode(&asset.info)?),
-        (Kind::Place, s.position_radius.iter().flat_map(place).flatten().collect()),
-        (Kind::Offset, s.offset.iter().zip(&s.depth.order).enumerate().flat_map(offset).collect()),
-        (Kind::Weight, halves(&weight)),
-        (Kind::DepthProfile, floats(&mut s.depth.profile.iter().copied())),
-        (Kind::DepthScale, halves(&s.depth.scale)),
-        (Kind::Depth, s.depth.codes.clone()),
+        (Kind::Place, s.position_radius[range.clone()].iter().flat_map(place).flatten().collect()),
+        (Kind::Offset, range.clone().flat_map(offset).collect()),
+        (Kind::Weight, halves(weight.iter().map(|w| f16::from_f32(*w)))),
+        (Kind::DepthScale, halves(s.depth.scale[range.clone()].iter().copied())),
+        (Kind::Depth, codes(&s.depth, depth)),
     ];
     if !s.lobe.is_empty() {
-        let codes = lobes.iter().filter(|code| **code != 0);
-        sections.push((Kind::Lobe, codes.flat_map(|code| code.to_le_bytes()).collect()));
+        let codes = range.clone().map(lobe_of).filter(|code| *code != 0);
+        sections.push((Kind::Lobe, codes.flat_map(u32::to_le_bytes).collect()));
     }
     if !s.boundary.is_empty() {
-        sections.push((Kind::BoundaryProfile, floats(&mut s.boundary.profile.iter().copied())));
-        sections.push((Kind::BoundaryScale, halves(&s.boundary.scale)));
-        sections.push((Kind::Boundary, s.boundary.codes.clone()));
+        sections.push((Kind::BoundaryScale, halves(s.boundary.scale[range.clone()].iter().copied())));
+        sections.push((Kind::Boundary, codes(&s.boundary, boundary)));
     }
-    sections.push((Kind::MeshPositions, floats(&mut asset.mesh_positions.iter().flatten().copied())));
-    sections.push((
-        Kind::MeshTriangles,
-        asset.mesh_triangles.iter().flatten().flat_map(|i| i.to_le_bytes()).collect(),
-    ));
-    if let Some(grid) = &asset.density {
-        let mut bytes: Vec<u8> = grid.size.iter().flat_map(|n| n.to_le_bytes()).collect();
-        bytes.extend(floats(&mut grid.min.iter().chain(&grid.max).copied()));
-        bytes.extend(grid.values.iter().flatten().flat_map(|v| v.to_le_bytes()));
-        sections.push((Kind::Density, bytes));
-    }
-    Ok(container::assemble(FORMAT_VERSION, &sections))
+    sections
 }
 
 /// Writes the asset; the file appears only when complete.

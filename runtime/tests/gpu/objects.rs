@@ -170,6 +170,7 @@ impl Object {
                 certificate: None,
             },
             samples,
+            levels: Vec::new(),
             mesh_positions: self.positions.iter().map(|p| p.to_array()).collect(),
             mesh_triangles: self.triangles.clone(),
             density: self.density.clone(),

@@ -136,6 +136,7 @@ pub fn ball(spacing: f64, centre: DVec3, phase: Phase) -> Asset {
             certificate: None,
         },
         samples,
+        levels: Vec::new(),
         mesh_positions: mesh.positions.iter().map(|p| p.as_vec3().to_array()).collect(),
         mesh_triangles: mesh.triangles.clone(),
         density: None,

@@ -52,6 +52,10 @@ pub struct Args {
     /// Play with this single-scattering albedo (0..1) instead of the baked one
     #[arg(long, value_name = "A|R,G,B", value_parser = parse_channels, allow_hyphen_values = true)]
     pub albedo: Option<DVec3>,
+    /// Play this level of detail alone, and read no more of the file than it needs: 0 are all samples, each further
+    /// one has about a quarter of them
+    #[arg(long, value_name = "K", requires = "output")]
+    pub level: Option<usize>,
     /// Draw the frame this many times, for timings
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1_000_000),
           requires = "output")]

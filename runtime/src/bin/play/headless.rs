@@ -24,7 +24,10 @@ pub fn run(args: &Args, output: &Path) -> Result<()> {
     let format = format_of(output)?;
     check_paths(args, output)?;
     args.edit().validate()?;
-    let asset = asset::read(&args.asset)?;
+    let asset = match args.level {
+        Some(level) => asset::read_level(&args.asset, level)?,
+        None => asset::read(&args.asset)?,
+    };
     let scene = match &args.scene {
         Some(path) => scene::load(path)?,
         None => default_scene(&asset.info),
