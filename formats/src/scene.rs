@@ -222,7 +222,8 @@ pub fn parse_scene(text: &str, folder: &Path) -> Result<Scene> {
 }
 
 impl Surface {
-    const DEFAULT: Self = Self { reflection: true, specular: 0.5, roughness: 0.3 };
+    /// What a scene without the table `surface` has.
+    pub const DEFAULT: Self = Self { reflection: true, specular: 0.5, roughness: 0.3 };
 }
 
 fn parse_camera(table: &Table) -> Result<Camera> {

@@ -23,7 +23,7 @@ const RATIO: usize = 4;
 /// Samples of a level, at least.
 const LEAST: usize = 64;
 /// Kernels of coarser levels are wider than their samples are sparser by this factor. Measured on the bunny with a quarter
-/// of the samples, error and kernels that a ray meets: 0.0327 and 78 at 1.0, 0.0304 and 94 at 1.1, 0.0297 and 120 at 1.25.
+/// of the samples, error and kernels that a ray meets: 0.0327 and 78 at 1.0 and 0.0304 and 94 at 1.1.
 const WIDER: f32 = 1.1;
 
 /// An order of the samples, and the weights of all levels in this order.

@@ -42,12 +42,16 @@ pub struct Options {
     pub sample_count: u32,
     /// How kernels are summed; `None`: whichever suits the device.
     pub path: Option<SplatPath>,
+    /// Levels of detail whose kernels reach no further than so many pixels are fine enough; 0: always all samples. Objects whose
+    /// density varies take a third of it. At 3.2 the bunny at 1/10 of 192 pixels is drawn with 1/16 of its samples, for 1.17 times
+    /// the error.
+    pub kernel_pixels: f32,
 }
 
 impl Options {
     /// A colour attachment alone, one sample.
     pub fn new(colour: TextureFormat) -> Self {
-        Self { colour, depth: None, sample_count: 1, path: None }
+        Self { colour, depth: None, sample_count: 1, path: None, kernel_pixels: 3.2 }
     }
 }
 
@@ -99,6 +103,8 @@ pub struct HostReport {
     pub lit: usize,
     /// Tiles of all objects.
     pub tiles: usize,
+    /// Samples of the levels that were drawn.
+    pub samples: u64,
     /// Whether the last picture still holds, so that nothing was recorded.
     pub reused: bool,
 }
@@ -106,7 +112,10 @@ pub struct HostReport {
 struct Instance {
     asset: usize,
     placement: Placement,
-    pipeline: Pipeline,
+    /// As they are played.
+    info: Info,
+    /// By level, those that were drawn.
+    levels: Vec<Option<Pipeline>>,
 }
 
 /// Buffers of the size of the picture.
@@ -132,7 +141,9 @@ pub struct Renderer {
     clip: Clip,
     limits: Limits,
     path: SplatPath,
-    assets: Vec<Option<Pipeline>>,
+    kernel_pixels: f32,
+    /// Levels of each, level 0 first.
+    assets: Vec<Option<Vec<Pipeline>>>,
     instances: Vec<Option<Instance>>,
     targets: Option<(Targets, PixelState)>,
     picture: Option<Picture>,
@@ -143,6 +154,7 @@ pub struct Renderer {
 /// An object that is in sight.
 struct Visible {
     instance: usize,
+    level: usize,
     frame: Frame,
     tiles: Vec<Tile>,
 }
@@ -160,6 +172,7 @@ impl Renderer {
             clip: Clip::new(device, &common),
             limits: Limits::new(device),
             path: options.path.unwrap_or_else(|| SplatPath::best(device)).checked(device)?,
+            kernel_pixels: options.kernel_pixels,
             assets: Vec::new(),
             instances: Vec::new(),
             targets: None,
@@ -174,7 +187,11 @@ impl Renderer {
     /// # Errors
     /// An asset that makes no sense or is too large for the device.
     pub fn add_asset(&mut self, device: &Device, asset: &Asset) -> Result<AssetId> {
-        self.assets.push(Some(Pipeline::new(device, asset, self.path)?));
+        let all = Pipeline::new(device, asset, self.path)?;
+        let coarser = (1..asset.level_sizes().len())
+            .map(|k| all.level(device, &asset.level(k)?))
+            .collect::<Result<Vec<_>>>()?;
+        self.assets.push(Some(std::iter::once(all).chain(coarser).collect()));
         Ok(AssetId(self.assets.len() - 1))
     }
 
@@ -194,17 +211,13 @@ impl Renderer {
     ///
     /// # Errors
     /// An asset that is not there, a placement that makes no sense.
-    pub fn add_instance(
-        &mut self,
-        device: &Device,
-        asset: AssetId,
-        placement: Placement,
-    ) -> Result<InstanceId> {
+    pub fn add_instance(&mut self, asset: AssetId, placement: Placement) -> Result<InstanceId> {
         placement.validate()?;
-        let pipeline = self.assets.get(asset.0).and_then(Option::as_ref).ok_or_else(|| missing("asset"))?;
-        let pipeline = pipeline.instance(device);
+        let levels = self.assets.get(asset.0).and_then(Option::as_ref).ok_or_else(|| missing("asset"))?;
+        let info = levels[0].asset.info.clone();
+        let levels = levels.iter().map(|_| None).collect();
         self.seen = None;
-        self.instances.push(Some(Instance { asset: asset.0, placement, pipeline }));
+        self.instances.push(Some(Instance { asset: asset.0, placement, info, levels }));
         Ok(InstanceId(self.instances.len() - 1))
     }
 
@@ -222,11 +235,13 @@ impl Renderer {
     ///
     /// # Errors
     /// An object that is not there, values out of range.
-    pub fn edit(&mut self, device: &Device, queue: &Queue, id: InstanceId, edit: &Edit) -> Result<()> {
+    pub fn edit(&mut self, id: InstanceId, edit: &Edit) -> Result<()> {
         let asset = self.instance_mut(id)?.asset;
         let baked = self.assets.get(asset).and_then(Option::as_ref).ok_or_else(|| missing("asset"))?;
-        let info = edit.apply(&baked.asset.info)?;
-        self.instance_mut(id)?.pipeline.set_own_material(device, queue, &info);
+        let info = edit.apply(&baked[0].asset.info)?;
+        let instance = self.instance_mut(id)?;
+        instance.info = info;
+        instance.levels.iter_mut().for_each(|level| *level = None);
         self.seen = None;
         Ok(())
     }
@@ -273,7 +288,7 @@ impl Renderer {
         let seen = host.depth.is_none().then_some(Seen { frames, exposure: host.exposure });
         let fits = self.picture.as_ref().is_some_and(|p| p.size == host.size);
         if fits && seen.is_some() && self.seen == seen {
-            self.report = HostReport { reused: true, tiles: 0, ..self.report };
+            self.report = HostReport { reused: true, tiles: 0, samples: 0, ..self.report };
             return Ok(());
         }
         self.seen = None;
@@ -291,14 +306,22 @@ impl Renderer {
         }
         let compose = self.compose.bind(device, targets, &picture.total, &picture.opaque);
         let timers = &mut Timers::off();
-        for Visible { instance, frame, tiles } in &visible {
+        for Visible { instance, level, frame, tiles } in &visible {
             let Some(instance) = &mut self.instances[*instance] else { continue };
-            let pipeline = &mut instance.pipeline;
+            let Some(Some(levels)) = self.assets.get(instance.asset) else { continue };
+            let Instance { placement, info, levels: own, .. } = instance;
+            let pipeline = own[*level].get_or_insert_with(|| {
+                let mut own = levels[*level].instance(device);
+                if own.asset.info.extinction != info.extinction || own.asset.info.albedo != info.albedo {
+                    own.set_own_material(device, queue, info);
+                }
+                own
+            });
             pipeline.begin_in(device, queue, frame, targets)?;
             pipeline.write_views(device, queue, frame, tiles, &[[0.5; 2]], 0);
             self.report.lit += usize::from(pipeline.record_lighting(encoder, timers));
             let clip = host.depth.map(|_| {
-                let per_unit = (1.0 / instance.placement.scale) as f32;
+                let per_unit = (1.0 / placement.scale) as f32;
                 self.clip.bind(device, &picture.distances, targets, per_unit, host.size[0])
             });
             for (view, tile) in tiles.iter().enumerate() {
@@ -344,24 +367,41 @@ impl Renderer {
         let mut report = HostReport::default();
         let mut visible = Vec::new();
         for (index, instance) in self.instances.iter().enumerate() {
-            let Some(Instance { placement, pipeline, .. }) = instance else { continue };
-            let info: &Info = &pipeline.asset.info;
+            let Some(Instance { placement, info, .. }) = instance else { continue };
+            let Some(levels) = self.levels_of(index) else { continue };
             let HostFrame { size, lights, environment, surface, .. } = *host;
             let frame = host.camera.frame(size, lights, environment, surface, placement, info);
             let Some([low, high]) = covered(&frame, info) else {
                 report.culled += 1;
                 continue;
             };
-            let budget = budget(device, pipeline.asset.pixel_state(), TOTAL);
+            let budget = budget(device, levels[0].asset.pixel_state(), TOTAL);
             let mut tiles = split(high[0] - low[0], high[1] - low[1], budget)?;
             tiles.iter_mut().for_each(|t| t.start = [t.start[0] + low[0], t.start[1] + low[1]]);
             report.drawn += 1;
             report.tiles += tiles.len();
             let distance = host.camera.distance(placement.centre(info));
-            visible.push((distance, Visible { instance: index, frame, tiles }));
+            let level = self.level(levels, &frame, info);
+            report.samples += u64::from(levels[level].asset.sample_count);
+            visible.push((distance, Visible { instance: index, level, frame, tiles }));
         }
         visible.sort_by(|a, b| a.0.total_cmp(&b.0));
         Ok((visible.into_iter().map(|(_, v)| v).collect(), report))
+    }
+
+    fn levels_of(&self, instance: usize) -> Option<&Vec<Pipeline>> {
+        let instance = self.instances.get(instance)?.as_ref()?;
+        self.assets.get(instance.asset)?.as_ref()
+    }
+
+    /// The coarsest level that is fine enough where the object is nearest.
+    fn level(&self, levels: &[Pipeline], frame: &Frame, info: &Info) -> usize {
+        let nearest = frame.view.origin.length() - 0.5 * info.diagonal();
+        let pixels =
+            0.5 * frame.height as f32 / (frame.view.up.length() * nearest.max(1e-6 * info.diagonal()));
+        let varies = levels[0].asset.pixel_state().heterogeneous;
+        let most = if varies { self.kernel_pixels / 3.0 } else { self.kernel_pixels };
+        (1..levels.len()).rev().find(|k| levels[*k].asset.reach * pixels <= most).unwrap_or(0)
     }
 
     /// Sees that the targets hold the largest tile and all that objects keep.
@@ -372,8 +412,8 @@ impl Renderer {
             for tile in &v.tiles {
                 (0..2).for_each(|c| needed.size[c] = needed.size[c].max(tile.size[c]));
             }
-            if let Some(instance) = &self.instances[v.instance] {
-                state = state.or(instance.pipeline.asset.pixel_state());
+            if let Some(levels) = self.levels_of(v.instance) {
+                state = state.or(levels[0].asset.pixel_state());
             }
         }
         if let Some((targets, known)) = &self.targets {

@@ -160,6 +160,11 @@ impl Pipeline {
     pub(super) fn set_material(&mut self, device: &Device, queue: &Queue, info: &Info) {
         self.asset.set_material(queue, info);
         self.lit = None;
+        self.renew_variant(device);
+    }
+
+    /// Compiles what the material needs and is not there.
+    fn renew_variant(&mut self, device: &Device) {
         let variant = self.asset.variant();
         match &mut self.splatting {
             Splatting::Quads(splat, _) => splat.set_variant(device, variant),
@@ -219,7 +224,20 @@ impl Pipeline {
 
     /// The same object once more, with lights and sources of its own.
     pub(super) fn instance(&self, device: &Device) -> Self {
-        let asset = self.asset.instance(device);
+        self.with(device, self.asset.instance(device))
+    }
+
+    /// Another level of the same asset, for which nothing is compiled that is there.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub(super) fn level(&self, device: &Device, asset: &Asset) -> Result<Self> {
+        let mut level = self.with(device, AssetBuffers::new(device, asset)?);
+        level.renew_variant(device);
+        Ok(level)
+    }
+
+    fn with(&self, device: &Device, asset: AssetBuffers) -> Self {
         Self {
             common: self.common.clone(),
             lighting: self.lighting.clone(),

@@ -77,7 +77,7 @@ impl Host {
 
     fn put(&mut self, asset: &Asset, placement: Placement) -> diaphane_runtime::gpu::InstanceId {
         let id = self.renderer.add_asset(&self.device, asset).unwrap();
-        self.renderer.add_instance(&self.device, id, placement).unwrap()
+        self.renderer.add_instance(id, placement).unwrap()
     }
 
     /// Colours and alpha, row by row.
@@ -277,16 +277,15 @@ fn nothing_is_done_twice_and_nothing_out_of_sight() {
     let behind = scene.camera.position + 9.0 * (scene.camera.position - scene.camera.target);
     host.put(&asset, Placement { translation: behind, ..Placement::IDENTITY });
     let first = host.draw(&host_frame(&scene, None));
-    let all = HostReport { drawn: 1, culled: 1, lit: 1, tiles: 1, reused: false };
+    let samples = asset.samples.len() as u64;
+    let all = HostReport { drawn: 1, culled: 1, lit: 1, tiles: 1, samples, reused: false };
     assert_eq!(host.renderer.report(), all);
     assert_eq!(host.draw(&host_frame(&scene, None)), first);
-    assert_eq!(host.renderer.report(), HostReport { lit: 0, tiles: 0, reused: true, ..all });
+    assert_eq!(host.renderer.report(), HostReport { lit: 0, tiles: 0, samples: 0, reused: true, ..all });
     scene.camera.position.x += 0.1;
     host.draw(&host_frame(&scene, None));
     assert_eq!(host.renderer.report(), HostReport { lit: 0, ..all });
-    host.renderer
-        .edit(&host.device, &host.queue, id, &Edit { albedo: Some(DVec3::ZERO), ..Edit::default() })
-        .unwrap();
+    host.renderer.edit(id, &Edit { albedo: Some(DVec3::ZERO), ..Edit::default() }).unwrap();
     let black = host.draw(&host_frame(&scene, None));
     assert_eq!(host.renderer.report(), all);
     assert_eq!(peak(&black), 0.0);
