@@ -1,6 +1,7 @@
 //! The command line.
 
-use clap::{Parser, ValueEnum};
+use crate::bench::BenchArgs;
+use clap::{Parser, Subcommand, ValueEnum};
 use diaphane_runtime::edit::{Edit, parse_channels};
 use diaphane_runtime::gpu::SplatPath;
 use diaphane_runtime::player::{Backend, LightMode};
@@ -20,11 +21,35 @@ Examples:
   diaphane-play lamp.dph --scene inside.scene.toml --output inside.exr --light auto
       traces rays to lights that stand inside the object
   diaphane-play statue.dph --extinction-scale 0.5 --albedo 0.9,0.8,0.6 --output amber.png
-      half as dense as baked, and another colour: no new bake is needed";
+      half as dense as baked, and another colour: no new bake is needed
+  diaphane-play bench statue.dph --output statue.bench.json
+      frame times against lights, resolution and level of detail";
 
 /// Plays a baked translucent asset in a window, or draws one picture of it.
 #[derive(Debug, Parser)]
-#[command(name = "diaphane-play", version, after_help = EXAMPLES)]
+#[command(
+    name = "diaphane-play",
+    version,
+    args_conflicts_with_subcommands = true,
+    subcommand_negates_reqs = true,
+    after_help = EXAMPLES
+)]
+pub struct Arguments {
+    #[command(subcommand)]
+    pub command: Option<Command>,
+    #[command(flatten)]
+    pub play: Option<Args>,
+}
+
+/// Other things to do with an asset.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Times frames along an orbit: lights, resolutions, levels of detail, one varied at a time
+    Bench(BenchArgs),
+}
+
+/// How an asset is played.
+#[derive(Debug, clap::Args)]
 pub struct Args {
     /// The baked asset (*.dph)
     pub asset: PathBuf,
