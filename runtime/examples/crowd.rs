@@ -41,7 +41,7 @@ fn main() -> Result<()> {
     renderer.add_instance(id, put(DVec3::ZERO, 0.0))?;
 
     let projection = camera::rh::proj::directx::perspective_infinite_reverse(0.6, 1.0, 0.01);
-    let mut time = |renderer: &mut Renderer| -> Result<f64> {
+    let time = |renderer: &mut Renderer| -> Result<f64> {
         let mut times = Vec::new();
         for k in 0..=FRAMES {
             // Camera and light move in every frame.

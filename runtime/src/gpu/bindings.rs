@@ -93,7 +93,8 @@ pub(super) fn pipeline_layout(
 
 /// Constants of a pipeline as overrides of the shader.
 pub(super) fn options<'a>(constants: &'a [(&'a str, f64)]) -> PipelineCompilationOptions<'a> {
-    PipelineCompilationOptions { constants, ..Default::default() }
+    // Shaders here write what they share before they read it.
+    PipelineCompilationOptions { constants, zero_initialize_workgroup_memory: false }
 }
 
 /// A compute pipeline.
