@@ -59,6 +59,26 @@ fn plays_one_level() {
 }
 
 #[test]
+fn benchmarks_name_what_they_skip() {
+    let folder = folder("bench");
+    let arguments = ["bench", "ball.dph", "--backend", "cpu", "--frames", "1"];
+    // So short that only the first cell of each axis runs.
+    let done = play(&folder, &[&arguments[..], &["--limit", "1e-6", "--output", "b.json"]].concat());
+    assert!(done.status.success(), "{done:?}");
+    let table: serde_json::Value =
+        serde_json::from_str(&std::fs::read_to_string(folder.join("b.json")).unwrap()).unwrap();
+    let (rows, skipped) = (table["rows"].as_array().unwrap(), table["skipped"].as_array().unwrap());
+    assert_eq!((rows.len(), skipped.len()), (4, 6 + 6 + 5));
+    assert!(
+        rows.iter()
+            .all(|r| r["frame_ms"].as_f64().unwrap() > 0.0 && r["splats_per_ray"].as_f64().unwrap() > 0.0)
+    );
+    assert!(String::from_utf8_lossy(&done.stdout).contains("skipped: 4096 lights"));
+    let refused = play(&folder, &[&arguments[..], &["--limit", "0"]].concat());
+    assert_eq!(refused.status.code(), Some(2));
+}
+
+#[test]
 fn writes_picture_and_statistics() {
     let folder = folder("writes");
     let arguments = ["ball.dph", "--scene", "a.scene.toml", "--backend", "cpu", "--frames", "3"];
