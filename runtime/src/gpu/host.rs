@@ -10,12 +10,12 @@
 //! ordered by the distance of their centres; where two run through each other the nearer one counts as in front altogether.
 
 use super::bindings::empty_buffer;
+use super::frame::common_layout;
 use super::passes::clip::Clip;
 use super::passes::compose::Compose;
 use super::passes::limits::Limits;
 use super::passes::overlay::Overlay;
 use super::pipeline::{Pipeline, SplatPath};
-use super::scene::common_layout;
 use super::targets::{PixelState, TOTAL, Targets, budget};
 use super::tiles::{Tile, split};
 use super::timers::Timers;

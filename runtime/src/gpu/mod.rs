@@ -13,8 +13,10 @@
 //! drawn indirectly and cost next to nothing where no ray has them. Sums are kept in 32-bit floats and added in the
 //! order of the samples: the same adapter draws the same bits every time.
 
+mod asset;
 mod bindings;
 mod device;
+mod frame;
 mod headless;
 mod host;
 mod neighbours;
@@ -23,7 +25,6 @@ mod passes;
 mod picture;
 mod pipeline;
 mod readback;
-mod scene;
 mod shaders;
 mod targets;
 mod tiles;

@@ -1,5 +1,7 @@
 //! The passes of a frame with everything that they read and write.
 
+use super::asset::AssetBuffers;
+use super::frame::{FrameBuffers, VIEW_STRIDE, common_layout};
 use super::passes::Recorder;
 use super::passes::boundary::Boundary;
 use super::passes::clip::Clip;
@@ -12,7 +14,6 @@ use super::passes::segments::Segments;
 use super::passes::slopes::Slopes;
 use super::passes::splat::Splat;
 use super::passes::surface::Surface;
-use super::scene::{AssetBuffers, FrameBuffers, VIEW_STRIDE, common_layout};
 use super::targets::{TOTAL, Targets, budget};
 use super::tiles::{Tile, split};
 use super::timers::Timers;

@@ -47,9 +47,9 @@ pub(super) const GATHER_PLAINLY: &str = gather!("gather_plain");
 pub(super) const LIMITS: &str = source!("limits");
 pub(super) const CLIP: &str = source!("shared/view", "clip");
 pub(super) const COMPOSE: &str = source!("shared/view", "compose");
-pub(super) const OVERLAY: &str = source!("overlay");
+pub(super) const OVERLAY: &str = source!("shared/whole", "overlay");
 pub(super) const PUBLISH: &str = source!("shared/view", "publish");
-pub(super) const DISPLAY: &str = source!("display");
+pub(super) const DISPLAY: &str = source!("shared/whole", "display");
 
 /// Compiles a shader.
 pub(super) fn module(device: &Device, label: &str, source: &'static str) -> ShaderModule {

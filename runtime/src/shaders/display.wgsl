@@ -8,17 +8,6 @@ struct Display {
 @group(0) @binding(0) var<uniform> display: Display;
 @group(0) @binding(1) var picture: texture_2d<f32>;
 
-struct Corner {
-    @builtin(position) position: vec4f,
-    @location(0) at: vec2f,
-}
-
-@vertex
-fn whole(@builtin(vertex_index) corner: u32) -> Corner {
-    let at = vec2f(f32(corner & 1u), f32(corner >> 1u)) * 2.0;
-    return Corner(vec4f(at.x * 2.0 - 1.0, 1.0 - at.y * 2.0, 0.0, 1.0), at);
-}
-
 fn load(at: vec2i, size: vec2i) -> vec3f {
     return textureLoad(picture, clamp(at, vec2i(0), size - 1), 0).rgb;
 }

@@ -124,6 +124,12 @@ struct PairSums {
     right: Sums,
 }
 
+fn add_kernel(before: PairSums, kernel: Kernel, rays: Pair) -> PairSums {
+    return PairSums(
+        sum(before.left, contribution(kernel, rays.left.index, rays.left.direction, rays.left.ends.xy)),
+        sum(before.right, contribution(kernel, rays.right.index, rays.right.direction, rays.right.ends.xy)));
+}
+
 fn ray_at(pixel: vec2u) -> Ray {
     var ray = Ray(0u, vec4f(0.0), ray_direction(pixel));
     if (all(pixel < view.tile_size)) {

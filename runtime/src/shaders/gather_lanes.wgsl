@@ -25,10 +25,7 @@ fn add_listed(before: PairSums, count: u32, lane: u32, lanes: u32, rays: Pair) -
                 let kernel = Kernel(subgroupShuffle(own.centre, k), subgroupShuffle(own.a, k),
                     subgroupShuffle(own.source, k), subgroupShuffle(own.slope_r, k),
                     subgroupShuffle(own.slope_g, k), subgroupShuffle(own.slope_b, k));
-                sums.left = sum(sums.left,
-                    contribution(kernel, rays.left.index, rays.left.direction, rays.left.ends.xy));
-                sums.right = sum(sums.right,
-                    contribution(kernel, rays.right.index, rays.right.direction, rays.right.ends.xy));
+                sums = add_kernel(sums, kernel, rays);
             }
         }
     }

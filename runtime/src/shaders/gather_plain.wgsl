@@ -3,10 +3,7 @@ fn add_listed(before: PairSums, count: u32, lane: u32, lanes: u32, rays: Pair) -
     var sums = before;
     for (var k = 0u; k < count; k++) {
         let kernel = kernel_of(listed[k]);
-        sums.left = sum(sums.left,
-            contribution(kernel, rays.left.index, rays.left.direction, rays.left.ends.xy));
-        sums.right = sum(sums.right,
-            contribution(kernel, rays.right.index, rays.right.direction, rays.right.ends.xy));
+        sums = add_kernel(sums, kernel, rays);
     }
     return sums;
 }

@@ -9,17 +9,6 @@ struct Overlay {
 @group(0) @binding(1) var<storage, read> total: array<vec4f>;
 @group(0) @binding(2) var<storage, read> opaque: array<vec4f>;
 
-struct Corner {
-    @builtin(position) position: vec4f,
-    @location(0) at: vec2f,
-}
-
-@vertex
-fn whole(@builtin(vertex_index) corner: u32) -> Corner {
-    let at = vec2f(f32(corner & 1u), f32(corner >> 1u)) * 2.0;
-    return Corner(vec4f(at.x * 2.0 - 1.0, 1.0 - at.y * 2.0, 0.0, 1.0), at);
-}
-
 fn place(at: vec2f) -> u32 {
     let pixel = min(vec2u(at * vec2f(overlay.size)), overlay.size - 1u);
     return pixel.y * overlay.size.x + pixel.x;

@@ -1,7 +1,8 @@
 //! The boundary pass: Fresnel reflectance of every crossing and the highlight of the first entry.
 
+use super::super::asset::AssetBuffers;
 use super::super::bindings::{Slot, group, layout, pipeline_layout};
-use super::super::scene::{AssetBuffers, FrameBuffers};
+use super::super::frame::FrameBuffers;
 use super::super::shaders;
 use super::super::targets::Targets;
 use super::super::timers::Pass;

@@ -1,7 +1,8 @@
 //! The fold pass: many directional lights as one vector, where a frame has so many.
 
+use super::super::asset::AssetBuffers;
 use super::super::bindings::{Slot, compute, group, layout, pipeline_layout};
-use super::super::scene::{AssetBuffers, FrameBuffers};
+use super::super::frame::FrameBuffers;
 use super::super::shaders;
 use super::super::timers::Pass;
 use super::Recorder;

@@ -1,8 +1,8 @@
 //! The gather pass: every sample's kernel along one inside piece of every pixel, tile by tile, and the result added to
 //! the picture.
 
+use super::super::asset::{AssetBuffers, Variant};
 use super::super::bindings::{Slot, compute, group, layout, pipeline_layout};
-use super::super::scene::{AssetBuffers, Variant};
 use super::super::shaders;
 use super::super::targets::{ARGUMENTS, OVER_TILES, Targets};
 use super::super::timers::Pass;

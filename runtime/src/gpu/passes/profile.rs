@@ -1,7 +1,7 @@
 //! The profile pass: density along one inside piece of every pixel.
 
+use super::super::asset::AssetBuffers;
 use super::super::bindings::{Slot, compute, group, layout, pipeline_layout};
-use super::super::scene::AssetBuffers;
 use super::super::shaders;
 use super::super::targets::{ARGUMENTS, OVER_CELLS, Targets};
 use super::super::timers::Pass;

@@ -1,7 +1,7 @@
 //! The resolve pass: one inside piece of every pixel joins the picture.
 
+use super::super::asset::AssetBuffers;
 use super::super::bindings::{Slot, compute, group, layout, pipeline_layout};
-use super::super::scene::AssetBuffers;
 use super::super::shaders;
 use super::super::targets::{ARGUMENTS, OVER_CELLS, Targets};
 use super::super::timers::Pass;

@@ -1,7 +1,7 @@
 //! The segments pass: inside pieces from sorted crossings.
 
+use super::super::asset::AssetBuffers;
 use super::super::bindings::{Slot, compute, group, layout, pipeline_layout};
-use super::super::scene::AssetBuffers;
 use super::super::shaders;
 use super::super::targets::Targets;
 use super::super::timers::Pass;

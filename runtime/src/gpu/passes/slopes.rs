@@ -1,7 +1,7 @@
 //! The slopes pass: sources from the lighting pass's values, once a frame.
 
+use super::super::asset::AssetBuffers;
 use super::super::bindings::{Slot, compute, group, layout, pipeline_layout};
-use super::super::scene::AssetBuffers;
 use super::super::shaders;
 use super::super::timers::Pass;
 use super::Recorder;

@@ -1,7 +1,7 @@
 //! The splat pass: every sample's kernel along one inside piece of every pixel.
 
+use super::super::asset::{AssetBuffers, Variant};
 use super::super::bindings::{Slot, group, layout, options, pipeline_layout};
-use super::super::scene::{AssetBuffers, Variant};
 use super::super::shaders;
 use super::super::targets::{ARGUMENTS, SUM_FORMAT, Targets};
 use super::super::timers::Pass;

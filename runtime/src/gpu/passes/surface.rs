@@ -1,7 +1,7 @@
 //! The surface pass: crossings of all rays with the mesh.
 
+use super::super::asset::AssetBuffers;
 use super::super::bindings::{Slot, group, layout, options, pipeline_layout};
-use super::super::scene::AssetBuffers;
 use super::super::shaders;
 use super::super::targets::{MARKER_FORMAT, Targets};
 use super::super::timers::Pass;
