@@ -86,14 +86,26 @@ impl Cloud {
         if self.centre.is_empty() {
             return;
         }
-        self.bvh.point_traverse(Vec3A::from(point), |bvh, index| {
-            let node = &bvh.nodes[index as usize];
-            for slot in node.first_index..node.first_index + node.prim_count {
-                visit(bvh.primitive_indices[slot as usize] as usize);
-            }
-            true
-        });
+        self.bvh.point_traverse(Vec3A::from(point), |bvh, index| each_of_leaf(bvh, index, &mut visit));
     }
+
+    /// Calls `visit` with every kernel whose support may meet the box.
+    pub fn for_each_near_box(&self, low: Vec3, high: Vec3, mut visit: impl FnMut(usize)) {
+        if self.centre.is_empty() {
+            return;
+        }
+        let around = Aabb::new(Vec3A::from(low), Vec3A::from(high));
+        self.bvh.aabb_traverse(around, |bvh, index| each_of_leaf(bvh, index, &mut visit));
+    }
+}
+
+/// Visits the kernels of a leaf, and asks for more.
+fn each_of_leaf(bvh: &Bvh2, index: u32, visit: &mut impl FnMut(usize)) -> bool {
+    let node = &bvh.nodes[index as usize];
+    for slot in node.first_index..node.first_index + node.prim_count {
+        visit(bvh.primitive_indices[slot as usize] as usize);
+    }
+    true
 }
 
 /// How the medium attenuates along one inside piece.

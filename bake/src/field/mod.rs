@@ -127,13 +127,32 @@ impl DistanceGrid {
     }
 }
 
-/// Majority vote over three lines through each node, each seen from both ends.
+/// Points of one task of [`inside_nodes`], at the least.
+const VOTING: usize = 1 << 15;
+
+/// Majority vote over three lines through each node, each seen from both ends. The third is looked along only where the
+/// first two leave it open.
 pub(crate) fn inside_nodes(mesh: &Mesh, nodes: &[DVec3]) -> Result<Vec<bool>> {
     let unit = Medium::new(DVec3::ONE, DVec3::ZERO, Phase::Isotropic, 1.0, Density::Uniform(1.0))?;
     let axes = even_directions(6, 0x5eed);
-    let votes: Vec<_> = [axes[0], axes[2], axes[4]]
-        .par_iter()
-        .map(|axis| project(mesh, &unit, nodes, *axis).winding)
+    let vote = |nodes: &[DVec3], axis: usize, votes: &mut dyn FnMut(usize)| {
+        let sides = project(mesh, &unit, nodes, axes[2 * axis]).winding;
+        sides.iter().for_each(|w| w.iter().enumerate().filter(|(_, w)| **w > 0).for_each(|(i, _)| votes(i)));
+    };
+    // Every task goes through all triangles.
+    let together = VOTING.max(mesh.triangles.len() / 4);
+    let votes: Vec<Vec<u8>> = nodes
+        .par_chunks(together)
+        .map(|nodes| {
+            let mut votes = vec![0u8; nodes.len()];
+            (0..2).for_each(|axis| vote(nodes, axis, &mut |i| votes[i] += 1));
+            let open: Vec<usize> = (0..nodes.len()).filter(|i| matches!(votes[*i], 2 | 3)).collect();
+            let places: Vec<DVec3> = open.iter().map(|i| nodes[*i]).collect();
+            if !places.is_empty() {
+                vote(&places, 2, &mut |k| votes[open[k]] += 1);
+            }
+            votes
+        })
         .collect();
-    Ok((0..nodes.len()).map(|i| votes.iter().flatten().filter(|w| w[i] > 0).count() > 3).collect())
+    Ok(votes.concat().into_iter().map(|votes| votes > 3).collect())
 }
