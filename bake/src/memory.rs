@@ -27,11 +27,11 @@ const TRIANGLE: u64 = 175;
 /// Bytes of a sample that every stage after the first takes for it.
 const STANDING: u64 = 600;
 /// Bytes of a sample while candidates are drawn, cells are projected, weights are solved (probes and what kernels make of
-/// them, twice), the certificate plays the asset.
+/// them), the certificate plays the asset.
 const PLACING: u64 = 1_050;
 const CELL: u64 = 1_000;
-const WEIGHTS: u64 = 2_500;
-const PLAYING: u64 = 1_500;
+const WEIGHTS: u64 = 1_580;
+const PLAYING: u64 = 1_710;
 /// The program itself, and what stages take whatever the number of samples.
 const PROGRAM: u64 = 60_000_000;
 /// Bytes for each point that a thread projects, and the most of them at once.

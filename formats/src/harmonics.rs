@@ -258,11 +258,13 @@ pub struct CodeBook<'a> {
 
 impl CodeBook<'_> {
     /// The coefficient that code `q` of `band` stands for.
+    #[inline]
     pub fn value(&self, band: usize, q: i32) -> f32 {
         self.scale * self.profile[band] * expanded(q, band)
     }
 
     /// The code whose value is nearest to a finite `value`.
+    #[inline]
     pub fn nearest(&self, band: usize, value: f32) -> i32 {
         let unit = self.scale * self.profile[band];
         if unit <= 0.0 {

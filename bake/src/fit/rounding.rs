@@ -105,6 +105,9 @@ impl Rounding {
                 let code = book.nearest(band, now[k] - gradient / curvature);
                 let value = book.value(band, code);
                 let step = value - now[k];
+                if step == 0.0 {
+                    continue;
+                }
                 changed |= code != codes[k];
                 (codes[k], now[k]) = (code, value);
                 let weights = sum.iter().zip(difference);

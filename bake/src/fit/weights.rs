@@ -1,7 +1,8 @@
 //! Kernel weights that make the sum of all kernels as even as possible.
 //!
 //! Non-negative least squares Σ_i w_i γ_i(x) = 1 over random inside points, weighted by √Φ, by multiplicative updates
-//! w_i ← w_i (AᵀWb)_i / (AᵀWAw)_i (Lee and Seung 2001), which keep every weight positive.
+//! w_i ← w_i [(AᵀWb)_i / (AᵀWAw)_i]^p, which keep every weight positive (Lee and Seung 2001 with p = 1; any p below 2 has
+//! the same fixed points).
 
 use crate::Result;
 use crate::progress::Stage;
@@ -12,8 +13,11 @@ use glam::{DVec3, Vec3};
 use half::f16;
 use rayon::prelude::*;
 
-/// Measured on four objects with 50,000 samples: the interpolation error is as after 60 to within 1 %.
-const ITERATIONS: usize = 20;
+/// Measured with 50,000 samples: the interpolation error of the bunny is 1.1 % above that after 60 plain ones, that of the
+/// layered cube is no higher; as after 20 plain ones.
+const ITERATIONS: usize = 10;
+/// p above.
+const OVERSHOOT: f32 = 1.8;
 
 /// Parts of all probes that threads work on; a fixed number, so that sums do not depend on the threads.
 const PARTS: usize = 32;
@@ -35,36 +39,49 @@ impl Rows {
     /// Of `probes`, of which neighbours in the list had better be neighbours in space.
     fn of(cloud: &Cloud, probes: &[Probe], stage: Stage<'_>) -> Result<Self> {
         let mut rows = Self { start: vec![0], ..Self::default() };
-        let mut found: [Vec<(u32, f32)>; GROUP] = Default::default();
+        let mut found = Default::default();
         for (g, group) in probes.chunks(GROUP).enumerate() {
             if g.is_multiple_of(512) {
                 stage.step(0)?;
             }
-            let at = |k: usize| group[k.min(group.len() - 1)].position;
-            let (low, high) = group.iter().fold((at(0), at(0)), |(low, high), probe| {
-                (low.min(probe.position), high.max(probe.position))
-            });
-            let [x, y, z] = [0, 1, 2].map(|axis| std::array::from_fn::<f32, GROUP, _>(|k| at(k)[axis]));
-            cloud.for_each_near_box(low, high, |i| {
-                let (centre, a) = (cloud.centre[i], cloud.sharpness[i]);
-                let value: [f32; GROUP] = std::array::from_fn(|k| {
-                    let (x, y, z) = (x[k] - centre.x, y[k] - centre.y, z[k] - centre.z);
-                    kernel::value(a, x * x + y * y + z * z)
-                });
-                for (found, value) in found.iter_mut().zip(value) {
-                    if value > 0.0 {
-                        found.push((i as u32, value));
-                    }
-                }
-            });
-            for (probe, found) in group.iter().zip(&mut found) {
-                rows.importance.push(probe.fluence.max(1e-6).sqrt());
-                rows.entries.append(found);
-                rows.start.push(rows.entries.len());
-            }
-            found.iter_mut().for_each(Vec::clear);
+            rows.add(cloud, group, &mut found);
         }
         Ok(rows)
+    }
+
+    /// Adds the rows of at most [`GROUP`] probes; `found` is room for their entries.
+    fn add(&mut self, cloud: &Cloud, group: &[Probe], found: &mut [Vec<(u32, f32)>; GROUP]) {
+        let (low, high) = bounds(group);
+        let (left, right) = group.split_at(group.len() / 2);
+        let across = |group| {
+            let (low, high) = bounds(group);
+            high.distance(low)
+        };
+        // Where the list jumps from one place to another.
+        if !left.is_empty() && across(left) + across(right) < 0.7 * high.distance(low) {
+            self.add(cloud, left, found);
+            return self.add(cloud, right, found);
+        }
+        let at = |k: usize| group[k.min(group.len() - 1)].position;
+        let [x, y, z] = [0, 1, 2].map(|axis| std::array::from_fn::<f32, GROUP, _>(|k| at(k)[axis]));
+        found.iter_mut().for_each(Vec::clear);
+        cloud.for_each_near_box(low, high, |i| {
+            let (centre, a) = (cloud.centre[i], cloud.sharpness[i]);
+            let value: [f32; GROUP] = std::array::from_fn(|k| {
+                let (x, y, z) = (x[k] - centre.x, y[k] - centre.y, z[k] - centre.z);
+                kernel::value(a, x * x + y * y + z * z)
+            });
+            for (found, value) in found.iter_mut().zip(value) {
+                if value > 0.0 {
+                    found.push((i as u32, value));
+                }
+            }
+        });
+        for (probe, found) in group.iter().zip(found) {
+            self.importance.push(probe.fluence.max(1e-6).sqrt());
+            self.entries.append(found);
+            self.start.push(self.entries.len());
+        }
     }
 
     /// Weight and entries of each row.
@@ -72,6 +89,12 @@ impl Rows {
         let entries = self.start.windows(2).map(|ends| &self.entries[ends[0]..ends[1]]);
         self.importance.iter().copied().zip(entries)
     }
+}
+
+/// Corners of the box around a few probes.
+fn bounds(probes: &[Probe]) -> (Vec3, Vec3) {
+    let both = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+    probes.iter().fold(both, |(low, high), p| (low.min(p.position), high.max(p.position)))
 }
 
 /// Σ_i w_i γ_i at the probe of a row.
@@ -129,7 +152,7 @@ pub(crate) fn weights(
         gathered(&rows, &mut by_rows, &mut got, |row| sum(row, &w));
         for ((w, wanted), got) in w.iter_mut().zip(&wanted).zip(&got) {
             if *got > 0.0 {
-                *w *= wanted / got;
+                *w *= (wanted / got).powf(OVERSHOOT);
             }
         }
         stage.step(1)?;

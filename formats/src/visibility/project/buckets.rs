@@ -2,6 +2,7 @@
 
 use super::cover::PADDING;
 use glam::DVec3;
+use pulp::Arch;
 use std::ops::Range;
 
 /// Cells across and along a square of two points: rows begin and end close to a triangle, yet are long enough to fill
@@ -27,14 +28,20 @@ pub(super) struct Buckets {
 
 impl Buckets {
     pub fn new(points: &[DVec3], frame: &[DVec3; 3]) -> Self {
+        Arch::new().dispatch(
+            #[inline(always)]
+            || Self::sorted(points, frame),
+        )
+    }
+
+    #[inline(always)]
+    fn sorted(points: &[DVec3], frame: &[DVec3; 3]) -> Self {
         let [u_axis, v_axis, z_axis] = *frame;
-        let projected: Vec<[f64; 3]> =
-            points.iter().map(|p| [p.dot(u_axis), p.dot(v_axis), p.dot(z_axis)]).collect();
         let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
-        for p in &projected {
-            for k in 0..2 {
-                low[k] = low[k].min(p[k]);
-                high[k] = high[k].max(p[k]);
+        for p in points {
+            for (k, x) in [p.dot(u_axis), p.dot(v_axis)].into_iter().enumerate() {
+                low[k] = if x < low[k] { x } else { low[k] };
+                high[k] = if x > high[k] { x } else { high[k] };
             }
         }
         let extent = [(high[0] - low[0]).max(1e-300), (high[1] - low[1]).max(1e-300)];
@@ -45,28 +52,32 @@ impl Buckets {
             .max(extent[0].max(extent[1]) / (2.0 * target.sqrt()).ceil());
         let inverse_cell = DENSER.map(|times| times / cell);
         let size = [0, 1].map(|k| (extent[k] * inverse_cell[k]) as usize + 1);
-        let cell_of = |p: &[f64; 3]| {
-            let x = (((p[0] - low[0]) * inverse_cell[0]) as usize).min(size[0] - 1);
-            let y = (((p[1] - low[1]) * inverse_cell[1]) as usize).min(size[1] - 1);
-            y * size[0] + x
+        let last = size.map(|size| (size - 1) as i32);
+        let place = |x: f64, k: usize| (((x - low[k]) * inverse_cell[k]) as i32).min(last[k]);
+        let cell_of = |p: &DVec3| {
+            let (x, y) = (place(p.dot(u_axis), 0), place(p.dot(v_axis), 1));
+            (y * size[0] as i32 + x) as u32
         };
+        let cells: Vec<u32> = points.iter().map(cell_of).collect();
         let mut start = vec![0u32; size[0] * size[1] + 1];
-        for p in &projected {
-            start[cell_of(p) + 1] += 1;
+        for c in &cells {
+            start[*c as usize] += 1;
         }
-        for i in 1..start.len() {
-            start[i] += start[i - 1];
+        // Where each cell ends, which its points move down to where it starts.
+        let mut sum = 0;
+        for s in &mut start {
+            sum += *s;
+            *s = sum;
         }
-        let mut next = start.clone();
         let n = points.len();
         let padded = n + PADDING;
         let mut order = vec![0; n];
         let [mut u, mut v, mut z] = [0; 3].map(|_| vec![0.0; padded]);
-        for (i, p) in projected.iter().enumerate() {
-            let slot = &mut next[cell_of(p)];
+        for (i, (p, c)) in points.iter().zip(&cells).enumerate().rev() {
+            let slot = &mut start[*c as usize];
+            *slot -= 1;
             let k = *slot as usize;
-            *slot += 1;
-            (order[k], u[k], v[k], z[k]) = (i as u32, p[0], p[1], p[2]);
+            (order[k], u[k], v[k], z[k]) = (i as u32, p.dot(u_axis), p.dot(v_axis), p.dot(z_axis));
         }
         Self { order, u, v, z, start, low, inverse_cell, size }
     }
