@@ -33,7 +33,7 @@ pub fn sharpness(radius: f32, width_factor: f32) -> f32 {
 }
 
 /// The kernel at squared distance `distance2`, 0 beyond the cut-off.
-#[inline]
+#[inline(always)]
 pub fn value(a: f32, distance2: f32) -> f32 {
     (approx::exp(-a * a * distance2) - CUT_OFF_VALUE).max(0.0)
 }

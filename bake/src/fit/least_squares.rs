@@ -11,10 +11,10 @@
 //! half the multiplications. Unknowns are kept in that order: even bands, then odd ones.
 
 use super::decoded::{Linear, SLOPE_RIGHT, butterfly, error, error_along, linearise, slopes, times_square};
+use super::product::multiply;
 use diaphane_formats::encoding::Encoding;
 use diaphane_formats::sh::{coefficient_count, evaluate};
 use glam::DVec3;
-use ndarray::linalg::general_mat_mul;
 use ndarray::{Array2, ArrayView1, ArrayView2, ArrayViewMut1, Axis, Slice, Zip};
 
 /// Functions fitted together: their values stay in the cache.
@@ -28,45 +28,61 @@ const MOST_DAMPING: f32 = 1.0;
 /// An improvement smaller than this fraction ends a fit.
 const ENOUGH: f32 = 1e-2;
 
-/// Harmonics in the first half of the directions, by parity.
+/// Harmonics in the first half of the directions, of even and of odd bands.
 pub(super) struct Basis {
-    /// Directions × coefficients of even bands.
-    even: Array2<f32>,
-    /// Directions × coefficients of odd bands.
-    odd: Array2<f32>,
+    /// Directions × coefficients.
+    rows: [Array2<f32>; 2],
+    /// Coefficients × directions.
+    columns: [Array2<f32>; 2],
+}
+
+/// The first bands of a [`Basis`], laid out as there.
+pub(super) struct Bands<'a> {
+    rows: [ArrayView2<'a, f32>; 2],
+    columns: [ArrayView2<'a, f32>; 2],
 }
 
 impl Basis {
     /// The basis of `order` bands in `directions`: opposite pairs, all first ones before all second ones.
     pub fn new(directions: &[DVec3], order: usize) -> Self {
         let half = directions.len() / 2;
-        let [even, odd] = [0, 1].map(|parity| Array2::zeros((half, places(order, parity).count())));
-        let mut basis = Self { even, odd };
+        let mut rows = [0, 1].map(|parity| Array2::zeros((half, places(order, parity).count())));
         let mut row = vec![0.0; coefficient_count(order)];
         for (k, direction) in directions.iter().take(half).enumerate() {
             evaluate(order, direction.to_array(), &mut row);
-            for (parity, out) in [&mut basis.even, &mut basis.odd].into_iter().enumerate() {
+            for (parity, out) in rows.iter_mut().enumerate() {
                 out.row_mut(k).iter_mut().zip(places(order, parity)).for_each(|(o, at)| *o = row[at] as f32);
             }
         }
-        basis
+        let columns = rows.each_ref().map(|rows| rows.t().as_standard_layout().into_owned());
+        Self { rows, columns }
     }
 
     /// Coefficients × directions of the first `order` bands, in the coefficients' order.
     pub fn columns(&self, order: usize) -> Array2<f32> {
-        let mut out = Array2::zeros((coefficient_count(order), self.even.nrows()));
-        for (parity, basis) in [&self.even, &self.odd].into_iter().enumerate() {
-            places(order, parity)
-                .zip(basis.columns())
-                .for_each(|(at, column)| out.row_mut(at).assign(&column));
+        let mut out = Array2::zeros((coefficient_count(order), self.rows[0].nrows()));
+        for (parity, basis) in self.columns.iter().enumerate() {
+            places(order, parity).zip(basis.rows()).for_each(|(at, column)| out.row_mut(at).assign(&column));
         }
         out
     }
 
     /// The first `order` bands of it.
-    pub fn bands(&self, order: usize) -> [ArrayView2<'_, f32>; 2] {
-        let columns = |parity| Slice::from(..places(order, parity).count());
-        [self.even.slice_axis(Axis(1), columns(0)), self.odd.slice_axis(Axis(1), columns(1))]
+    pub fn bands(&self, order: usize) -> Bands<'_> {
+        let first = |parity| Slice::from(..places(order, parity).count());
+        Bands {
+            rows: [0, 1].map(|p| self.rows[p].slice_axis(Axis(1), first(p))),
+            columns: [0, 1].map(|p| self.columns[p].slice_axis(Axis(0), first(p))),
+        }
+    }
+}
+
+impl Bands<'_> {
+    fn view(&self) -> Bands<'_> {
+        Bands {
+            rows: self.rows.each_ref().map(|part| part.view()),
+            columns: self.columns.each_ref().map(|part| part.view()),
+        }
     }
 }
 
@@ -89,8 +105,7 @@ pub(super) fn in_order<'a>(places: &[usize], unknowns: impl Iterator<Item = &'a 
 
 /// What is fitted: rows are functions, columns directions.
 pub(super) struct Batch<'a> {
-    /// Basis values of even and of odd bands.
-    pub basis: [ArrayView2<'a, f32>; 2],
+    pub basis: Bands<'a>,
     /// One more basis function for each row.
     pub lobe: Option<&'a Array2<f32>>,
 }
@@ -98,7 +113,7 @@ pub(super) struct Batch<'a> {
 impl Batch<'_> {
     /// Coefficients of each row.
     fn harmonics(&self) -> usize {
-        self.basis[0].ncols() + self.basis[1].ncols()
+        self.basis.rows.iter().map(ArrayView2::ncols).sum()
     }
 
     /// Unknowns of each row.
@@ -107,11 +122,12 @@ impl Batch<'_> {
     }
 
     fn forward(&self, x: &Array2<f32>, y: &mut Array2<f32>) {
-        let (even, n) = (self.basis[0].ncols(), self.harmonics());
-        let (mut left, mut right) = y.view_mut().split_at(Axis(1), self.basis[0].nrows());
+        let [even, odd] = &self.basis.columns;
+        let n = self.harmonics();
+        let (left, right) = y.view_mut().split_at(Axis(1), even.ncols());
         let part = |from: usize, to: usize| x.slice_axis(Axis(1), Slice::from(from..to));
-        general_mat_mul(1.0, &part(0, even), &self.basis[0].t(), 0.0, &mut left);
-        general_mat_mul(1.0, &part(even, n), &self.basis[1].t(), 0.0, &mut right);
+        multiply(&part(0, even.nrows()), even, left);
+        multiply(&part(even.nrows(), n), odd, right);
         y.rows_mut().into_iter().for_each(|row| butterfly(slice_mut(row)));
         if let Some(lobe) = self.lobe {
             for ((mut y, lobe), x) in y.rows_mut().into_iter().zip(lobe.rows()).zip(x.column(n)) {
@@ -122,19 +138,20 @@ impl Batch<'_> {
 
     /// The products of `y` with all basis functions; `y` is used up.
     fn backward(&self, y: &mut Array2<f32>, x: &mut Array2<f32>) {
-        let (even, n) = (self.basis[0].ncols(), self.harmonics());
+        let [even, odd] = &self.basis.rows;
+        let n = self.harmonics();
         if let Some(lobe) = self.lobe {
             for ((y, lobe), x) in y.rows().into_iter().zip(lobe.rows()).zip(x.column_mut(n)) {
                 *x = y.dot(&lobe);
             }
         }
         y.rows_mut().into_iter().for_each(|row| butterfly(slice_mut(row)));
-        let (left, right) = y.view().split_at(Axis(1), self.basis[0].nrows());
+        let (left, right) = y.view().split_at(Axis(1), even.nrows());
         let mut part = |from: usize, to: usize, y: &ArrayView2<'_, f32>, basis: &ArrayView2<'_, f32>| {
-            general_mat_mul(1.0, y, basis, 0.0, &mut x.slice_axis_mut(Axis(1), Slice::from(from..to)));
+            multiply(y, basis, x.slice_axis_mut(Axis(1), Slice::from(from..to)));
         };
-        part(0, even, &left, &self.basis[0]);
-        part(even, n, &right, &self.basis[1]);
+        part(0, even.ncols(), &left, even);
+        part(even.ncols(), n, &right, odd);
     }
 
     /// Minimises |weight (B x) - right|² + λ mean(weight²) |x|² for every row.
@@ -232,7 +249,7 @@ impl Batch<'_> {
                 linearise(encoding, slice(y.row(q)), slice(psi.row(q)), out);
             }
             let lobe = self.lobe.map(|lobe| lobe.select(Axis(0), &open));
-            let part = Batch { basis: self.basis, lobe: lobe.as_ref() };
+            let part = Batch { basis: self.basis.view(), lobe: lobe.as_ref() };
             let damped: Vec<f32> = open.iter().map(|q| damping[*q]).collect();
             let step = part.linear(&weight, &right, &damped, INNER);
             part.forward(&step, &mut moved);

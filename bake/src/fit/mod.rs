@@ -8,6 +8,7 @@ mod harmonics;
 mod ladder;
 mod least_squares;
 mod levels;
+mod product;
 mod rounding;
 mod weights;
 

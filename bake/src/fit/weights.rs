@@ -11,6 +11,7 @@ use diaphane_formats::kernel;
 use diaphane_formats::reconstruct::Cloud;
 use glam::{DVec3, Vec3};
 use half::f16;
+use pulp::Arch;
 use rayon::prelude::*;
 
 /// Measured with 50,000 samples: the interpolation error of the bunny is 1.1 % above that after 60 plain ones, that of the
@@ -65,12 +66,18 @@ impl Rows {
         let at = |k: usize| group[k.min(group.len() - 1)].position;
         let [x, y, z] = [0, 1, 2].map(|axis| std::array::from_fn::<f32, GROUP, _>(|k| at(k)[axis]));
         found.iter_mut().for_each(Vec::clear);
+        let arch = Arch::new();
         cloud.for_each_near_box(low, high, |i| {
             let (centre, a) = (cloud.centre[i], cloud.sharpness[i]);
-            let value: [f32; GROUP] = std::array::from_fn(|k| {
-                let (x, y, z) = (x[k] - centre.x, y[k] - centre.y, z[k] - centre.z);
-                kernel::value(a, x * x + y * y + z * z)
-            });
+            let value: [f32; GROUP] = arch.dispatch(
+                #[inline(always)]
+                || {
+                    std::array::from_fn(|k| {
+                        let (x, y, z) = (x[k] - centre.x, y[k] - centre.y, z[k] - centre.z);
+                        kernel::value(a, x * x + y * y + z * z)
+                    })
+                },
+            );
             for (found, value) in found.iter_mut().zip(value) {
                 if value > 0.0 {
                     found.push((i as u32, value));
