@@ -6,12 +6,11 @@
 //! error of those that are (the error feedback of Hassibi and Stork 1993, by coordinate descent instead of an inverse).
 //! Measured at equal bytes on the bird at extinction 64 per diagonal, lit from behind: error 0.190 before, 0.173 so.
 
-use super::decoded::{LANES, sensitivities, sum};
+use super::decoded::{LANES, narrow, sensitivities, sum};
 use super::least_squares::Basis;
 use diaphane_formats::encoding::Encoding;
 use diaphane_formats::harmonics::CodeBook;
 use ndarray::Array2;
-use pulp::Arch;
 
 /// Times that all coefficients are gone through.
 const SWEEPS: usize = 3;
@@ -49,7 +48,7 @@ impl Rounding {
             return;
         }
         let y: Vec<f32> = (0..2 * self.columns.ncols()).map(lobe).collect();
-        Arch::new().dispatch(
+        narrow().dispatch(
             #[inline(always)]
             || {
                 let mut pairs = self.pairs(x, y);
