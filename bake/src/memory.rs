@@ -36,7 +36,7 @@ const PLAYING: u64 = 1_710;
 const PROGRAM: u64 = 60_000_000;
 /// Bytes for each point that a thread projects, and the most of them at once.
 const PROJECTED: u64 = 80;
-const MOST_PROJECTED: u64 = 1 << 18;
+const MOST_PROJECTED: u64 = 1 << 16;
 /// Bytes of a voxel of a density field.
 const VOXEL: u64 = 24;
 

@@ -38,26 +38,30 @@ pub(crate) fn buried(samples: &[Candidate], nearest: &[Option<Nearest>]) -> Vec<
     samples.iter().zip(nearest).map(|(s, n)| !within(s, n)).collect()
 }
 
-/// The points of all samples.
+/// The points of all samples. They are looked at by turns, a few of every sample at each.
 pub(crate) struct Cells {
-    /// Row-major [sample][point].
+    /// Row-major [turn][sample][point].
     points: Vec<DVec3>,
-    /// Points of a sample.
-    pub size: usize,
+    samples: usize,
+    /// Points of a sample, and those of one turn, which divide them.
+    size: usize,
+    count: usize,
 }
 
 impl Cells {
-    /// `size` points for each sample; those of the samples that `buried` names are inside without a test.
+    /// `size` points for each sample, `count` at a turn; those of the samples that `buried` names are inside without a test.
     pub fn new(
         shape: &Shape<'_>,
         medium: &Medium,
         samples: &[Candidate],
         buried: &[bool],
-        size: usize,
+        (size, count): (usize, usize),
         seed: u64,
     ) -> Result<Self> {
+        let n = samples.len();
         if size <= 1 {
-            return Ok(Self { points: samples.iter().map(|s| s.position).collect(), size: 1 });
+            let points = samples.iter().map(|s| s.position).collect();
+            return Ok(Self { points, samples: n, size: 1, count: 1 });
         }
         let width = TRIES * size;
         let tries = |i: usize| {
@@ -70,7 +74,7 @@ impl Cells {
         let inside = inside_nodes(shape.mesh, &tested)?;
         let mut row = vec![usize::MAX; samples.len()];
         doubtful.iter().enumerate().for_each(|(k, i)| row[*i] = k);
-        let points = samples
+        let by_sample: Vec<DVec3> = samples
             .par_iter()
             .enumerate()
             .flat_map_iter(|(i, s)| {
@@ -89,12 +93,33 @@ impl Cells {
                 (0..size).map(move |k| kept[k % found])
             })
             .collect();
-        Ok(Self { points, size })
+        // A turn takes points that lie far apart in the sequence.
+        let turns = size / count;
+        let mut points = vec![DVec3::ZERO; by_sample.len()];
+        points.par_chunks_mut(n * count).enumerate().for_each(|(turn, points)| {
+            for (own, all) in points.chunks_exact_mut(count).zip(by_sample.chunks_exact(size)) {
+                own.iter_mut().zip(all.iter().skip(turn).step_by(turns)).for_each(|(own, p)| *own = *p);
+            }
+        });
+        Ok(Self { points, samples: n, size, count })
     }
 
-    /// All points, those of a sample together.
+    /// All points, those of a turn together and within it those of a sample.
     pub fn points(&self) -> &[DVec3] {
         &self.points
+    }
+
+    /// The mean over the points of each sample of a value of every point.
+    pub fn means(&self, values: impl Fn(usize) -> f32) -> Vec<f32> {
+        let mut sums = vec![0.0; self.samples];
+        for turn in (0..self.points.len()).step_by((self.samples * self.count).max(1)) {
+            for (i, sum) in sums.iter_mut().enumerate() {
+                let own = turn + i * self.count;
+                *sum += (own..own + self.count).map(&values).sum::<f32>();
+            }
+        }
+        sums.iter_mut().for_each(|sum| *sum /= self.size as f32);
+        sums
     }
 
     /// What the asset stores of the centroids: how far they lie from `samples`, in 127ths of a radius.
@@ -107,20 +132,18 @@ impl Cells {
         samples.iter().enumerate().map(one).collect()
     }
 
-    /// The points of sample `i`.
-    fn of(&self, i: usize) -> &[DVec3] {
-        &self.points[i * self.size..(i + 1) * self.size]
-    }
-
     /// The mean of the points of sample `i`: where its values hold.
     fn centroid(&self, i: usize) -> DVec3 {
-        self.of(i).iter().sum::<DVec3>() / self.size as f64
+        let turns = self.points.chunks_exact(self.samples * self.count);
+        let own = turns.flat_map(|turn| &turn[i * self.count..(i + 1) * self.count]);
+        own.sum::<DVec3>() / self.size as f64
     }
 
-    /// `count` points of every sample, row-major [sample][point], others at every turn; `count` divides the size.
-    pub fn turn(&self, turn: usize, count: usize) -> Vec<DVec3> {
-        let stride = self.size / count;
-        self.points.iter().skip(turn % stride).step_by(stride).copied().collect()
+    /// The points of a turn, row-major [sample][point]; after the last turn comes the first.
+    pub fn turn(&self, turn: usize) -> &[DVec3] {
+        let own = self.samples * self.count;
+        let turn = turn % (self.size / self.count);
+        &self.points[turn * own..(turn + 1) * own]
     }
 }
 

@@ -17,6 +17,7 @@ use diaphane_formats::directions::{even_directions, hash};
 use diaphane_formats::slopes::CELL_RADIUS;
 use diaphane_formats::visibility::{DepthRows, Nearest};
 use glam::{DVec3, Vec3};
+use pulp::Arch;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -59,7 +60,7 @@ const POOL: usize = 16;
 const NEAR: f64 = 2.0;
 
 /// Pairs of opposite directions projected before their rows are turned into columns: bounds the memory of the rows.
-const GROUP: usize = 8;
+const GROUP: usize = 32;
 
 /// Unit vectors in which samples are lit: the first ones of opposite pairs, then their opposites in the same order.
 pub(crate) fn directions(params: &Params) -> Vec<DVec3> {
@@ -96,7 +97,7 @@ impl<'a> Task<'a> {
         let nearest = nearest(shape, samples, NEAR.max(f64::from(CELL_RADIUS)));
         let buried = buried(samples, &nearest);
         let seed = hash(hash(params.seed, 37), block as u64);
-        let cells = Cells::new(shape, medium.medium, samples, &buried, size, seed)?;
+        let cells = Cells::new(shape, medium.medium, samples, &buried, (size, count), seed)?;
         Ok(Self { samples, nearest, cells, buried: buried.iter().filter(|b| **b).count() })
     }
 }
@@ -125,25 +126,27 @@ pub(crate) fn depths(
             .par_iter()
             .enumerate()
             .map(|(k, axis)| {
-                let points = cells.turn(g * GROUP + k, count);
-                let rows = visibility::depths(shape, medium, method, &points, *axis);
+                let rows = visibility::depths(shape, medium, method, cells.turn(g * GROUP + k), *axis);
                 stage.step(1)?;
-                Ok(Row::new(&rows, kappa, count))
+                Ok(Arch::new().dispatch(
+                    #[inline(always)]
+                    || Row::new(&rows, kappa, count),
+                ))
             })
             .collect::<Result<_>>()?;
-        let columns = |out: &mut [u16], value: &dyn Fn(&Row, usize) -> f32| {
+        transmittance.par_chunks_mut(d).enumerate().for_each(|(i, out)| {
             for (k, row) in rows.iter().enumerate() {
-                (0..2).for_each(|side| out[side * half + g * GROUP + k] = fixed(value(row, side)));
+                (0..2).for_each(|side| out[side * half + g * GROUP + k] = fixed(row.psi[side][i]));
             }
-        };
-        transmittance.par_chunks_mut(d).zip(&mut outside_votes).enumerate().for_each(|(i, (out, votes))| {
-            columns(out, &|row, side| row.psi[side][i]);
+        });
+        outside_votes.par_iter_mut().enumerate().for_each(|(i, votes)| {
             *votes += rows.iter().map(|row| u32::from(row.outside[i])).sum::<u32>();
         });
-        boundary
-            .par_chunks_mut(d)
-            .enumerate()
-            .for_each(|(i, out)| columns(out, &|row, side| row.through[side][i]));
+        boundary.par_chunks_mut(d).enumerate().for_each(|(i, out)| {
+            for (k, row) in rows.iter().enumerate() {
+                (0..2).for_each(|side| out[side * half + g * GROUP + k] = fixed(row.through[side][i]));
+            }
+        });
     }
     let keep: Vec<bool> = (0..n)
         .into_par_iter()
@@ -190,8 +193,10 @@ struct Row {
 
 impl Row {
     /// From the depths of `count` points for each sample, at extinction `kappa`.
+    #[inline(always)]
     fn new(rows: &DepthRows, kappa: f32, count: usize) -> Self {
-        let psi = [0, 1].map(|side| rows.lengths(side).iter().map(|m| exp(-kappa * m)).collect::<Vec<f32>>());
+        let mut psi = [0, 1].map(|side| rows.lengths(side).to_vec());
+        psi.iter_mut().flatten().for_each(|m| *m = exp(-kappa * *m));
         let through = [0, 1].map(|side| {
             let points = psi[side].chunks_exact(count).zip(rows.boundary[side].chunks_exact(count));
             let mean = |(psi, boundary): (&[f32], &[f32])| {

@@ -24,11 +24,9 @@ pub(crate) fn means(
             let kappa = medium.medium.extinction()[*channel] as f32;
             let rows = project_with(shape.mesh, medium.medium, medium.for_rays(), points, *towards);
             let through = |q: usize| rows.boundary[0].get(q).copied().unwrap_or(1.0);
-            let arriving: Vec<f32> =
-                rows.forward.iter().enumerate().map(|(q, m)| (-kappa * m).exp() * through(q)).collect();
+            let arriving = cells.means(|q| (-kappa * rows.forward[q]).exp() * through(q));
             stage.step(1)?;
-            let size = cells.size;
-            Ok(arriving.chunks_exact(size).map(|cell| cell.iter().sum::<f32>() / size as f32).collect())
+            Ok(arriving)
         })
         .collect()
 }

@@ -69,7 +69,7 @@ impl Trial {
         let seed = hash(bench.params.seed, 97);
         let near = nearest(bench.shape, &placed.samples, f64::from(CELL_RADIUS));
         let buried = buried(&placed.samples, &near);
-        let cells = Cells::new(bench.shape, medium, &placed.samples, &buried, POINTS, seed)?;
+        let cells = Cells::new(bench.shape, medium, &placed.samples, &buried, (POINTS, POINTS), seed)?;
         let middle = bench.shape.mesh.centre();
         let weight = weights(&placed.samples, middle, &placed.probes, width_factor, stage)?;
         let params = &crate::params::Params { width_factor, ..bench.params.clone() };
