@@ -64,21 +64,39 @@ fn rows<S: Simd, const R: usize>(simd: S, left: &[&[f32]; R], right: &[&[f32]], 
         out.iter_mut().zip(sums).for_each(|(out, sum)| simd.partial_store_f32s(out, sum));
         return;
     }
+    // The last vector ends where the columns do and overlaps the one before.
+    let at = |from: usize| from.min(columns - lanes);
     for from in (0..columns).step_by(2 * lanes) {
-        // The last vectors end where the columns do and overlap those before.
-        let from = [from, from + lanes].map(|from| from.min(columns - lanes));
-        let mut sums = [[simd.splat_f32s(0.0); 2]; R];
-        for (k, right) in right.iter().enumerate() {
-            let right = from.map(|from| S::as_simd_f32s(&right[from..from + lanes]).0[0]);
-            for (sums, left) in sums.iter_mut().zip(left) {
-                let left = simd.splat_f32s(left[k]);
-                *sums = [0, 1].map(|v| simd.mul_add_e_f32s(left, right[v], sums[v]));
+        if from + lanes < columns {
+            block(simd, &left, right, out, [at(from), at(from + lanes)]);
+        } else {
+            block(simd, &left, right, out, [at(from)]);
+        }
+    }
+}
+
+/// Vectors of a few rows of the result, which begin at the columns `from`.
+#[inline(always)]
+fn block<S: Simd, const R: usize, const V: usize>(
+    simd: S,
+    left: &[&[f32]; R],
+    right: &[&[f32]],
+    out: &mut [&mut [f32]; R],
+    from: [usize; V],
+) {
+    let mut sums = [[simd.splat_f32s(0.0); V]; R];
+    for (k, right) in right.iter().enumerate() {
+        let right = from.map(|from| S::as_simd_f32s(&right[from..from + S::F32_LANES]).0[0]);
+        for (sums, left) in sums.iter_mut().zip(left) {
+            let left = simd.splat_f32s(left[k]);
+            for (sum, right) in sums.iter_mut().zip(right) {
+                *sum = simd.mul_add_e_f32s(left, right, *sum);
             }
         }
-        for (out, sums) in out.iter_mut().zip(sums) {
-            for (from, sum) in from.into_iter().zip(sums) {
-                S::as_mut_simd_f32s(&mut out[from..from + lanes]).0[0] = sum;
-            }
+    }
+    for (out, sums) in out.iter_mut().zip(sums) {
+        for (from, sum) in from.into_iter().zip(sums) {
+            S::as_mut_simd_f32s(&mut out[from..from + S::F32_LANES]).0[0] = sum;
         }
     }
 }
