@@ -56,7 +56,6 @@ fn fluence(
 ) -> Result<Vec<f32>> {
     let kappa = medium.medium.reference_extinction() as f32;
     let count = DENSITY_DIRECTIONS.min(params.directions).next_multiple_of(2);
-    let how = params.visibility;
     let axes: Vec<DVec3> = even_directions(count, seed).into_iter().step_by(2).collect();
     stage.announce(axes.len());
     let mut sum = vec![0.0f32; points.len()];
@@ -65,7 +64,7 @@ fn fluence(
         let rows: Vec<_> = group
             .par_iter()
             .map(|axis| {
-                let rows = visibility::depths(shape, medium, how, points, *axis);
+                let rows = visibility::depths(shape, medium, shape.visibility, points, *axis);
                 stage.step(1)?;
                 Ok(rows)
             })

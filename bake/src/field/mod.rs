@@ -4,7 +4,7 @@
 //! distance by closest-point queries on the box hierarchy. Outside nodes further than two cells from the surface are
 //! not needed by anyone and are skipped.
 
-use crate::params::Params;
+use crate::params::{Params, Visibility};
 use crate::progress::Stage;
 use crate::{Error, Result};
 use diaphane_formats::directions::even_directions;
@@ -23,6 +23,8 @@ pub(crate) struct Shape<'a> {
     pub diagonal: f64,
     /// Mean distance between samples if they filled the volume evenly.
     pub spacing: f64,
+    /// How optical depths are found.
+    pub visibility: Visibility,
 }
 
 /// Depth at the nodes of a regular grid.
@@ -66,7 +68,8 @@ impl DistanceGrid {
 impl<'a> Shape<'a> {
     pub fn new(mesh: &'a Mesh, params: &Params) -> Self {
         let spacing = (mesh.volume() / params.samples as f64).cbrt();
-        Self { mesh, accel: Accel::new(mesh), diagonal: mesh.diagonal(), spacing }
+        let (accel, visibility) = (Accel::new(mesh), params.visibility);
+        Self { mesh, accel, diagonal: mesh.diagonal(), spacing, visibility }
     }
 }
 

@@ -3,8 +3,7 @@
 use crate::field::Shape;
 use crate::fit::Cells;
 use crate::progress::Stage;
-use crate::{Prepared, Result};
-use diaphane_formats::visibility::project_with;
+use crate::{Prepared, Result, visibility};
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -22,7 +21,7 @@ pub(crate) fn means(
         .par_iter()
         .map(|(towards, channel)| {
             let kappa = medium.medium.extinction()[*channel] as f32;
-            let rows = project_with(shape.mesh, medium.medium, medium.for_rays(), points, *towards);
+            let rows = visibility::depths(shape, medium, shape.visibility, points, *towards);
             let through = |q: usize| rows.boundary[0].get(q).copied().unwrap_or(1.0);
             let arriving = cells.means(|q| (-kappa * rows.forward[q]).exp() * through(q));
             stage.step(1)?;

@@ -13,9 +13,9 @@
 use super::views::View;
 use crate::field::Shape;
 use crate::progress::Stage;
-use crate::{Prepared, Result};
+use crate::{Prepared, Result, visibility};
 use diaphane_formats::directions::hash;
-use diaphane_formats::visibility::{DepthRows, InsidePiece, project_with};
+use diaphane_formats::visibility::{DepthRows, InsidePiece};
 use glam::{DVec3, Vec3};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
@@ -106,7 +106,7 @@ impl Nodes {
             .with_max_len(1)
             .map(|group| {
                 let axis = directions[group.start];
-                let rows = project_with(shape.mesh, medium.medium, medium.for_rays(), &self.position, axis);
+                let rows = visibility::depths(shape, medium, shape.visibility, &self.position, axis);
                 stage.step(group.len())?;
                 Ok(group.clone().map(|l| self.gather(medium, &rows, l - group.start, l % 3)).collect())
             })
