@@ -26,9 +26,8 @@ pub(super) struct AssetBuffers {
     pub triangles: Buffer,
     pub neighbours: Buffer,
     pub normals: Buffer,
+    /// Kernels, then a sphere around every [`CLUSTER`] of them that follow each other; radius 0 without any.
     pub samples: Buffer,
-    /// A sphere around every [`CLUSTER`] kernels that follow each other; radius 0 without any.
-    pub clusters: Buffer,
     pub weights: Buffer,
     pub depth: Buffer,
     pub boundary: Buffer,
@@ -120,8 +119,12 @@ impl AssetBuffers {
             triangles: filled_buffer(device, "triangles", &asset.mesh_triangles, storage),
             neighbours: filled_buffer(device, "neighbours", &neighbours(&asset.mesh_triangles), storage),
             normals: filled_buffer(device, "normals", normals.as_flattened(), storage),
-            samples: filled_buffer(device, "samples", &kernels, storage),
-            clusters: filled_buffer(device, "clusters", &clusters(&kernels, &samples.weight), storage),
+            samples: filled_buffer(
+                device,
+                "samples",
+                &[&kernels[..], &clusters(&kernels, &samples.weight)].concat(),
+                storage,
+            ),
             weights: filled_buffer(device, "weights", &samples.weight, storage),
             depth: filled_buffer(device, "depth", &packed::words(&samples.depth), storage),
             boundary: filled_buffer(device, "boundary", &packed::words(&samples.boundary), storage),

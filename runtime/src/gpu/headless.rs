@@ -166,7 +166,7 @@ impl GpuRenderer {
                 queue.submit([encoder.finish()]);
             };
             submit(&mut self.timers, &|encoder, timers| {
-                self.renderer.record_start(encoder);
+                self.renderer.record_start(encoder, tile);
                 if t == 0 {
                     self.renderer.record_lighting(encoder, timers);
                 }

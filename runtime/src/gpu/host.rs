@@ -325,7 +325,7 @@ impl Renderer {
                 self.clip.bind(device, &picture.distances, targets, per_unit, host.size[0])
             });
             for (view, tile) in tiles.iter().enumerate() {
-                pipeline.record_start(encoder);
+                pipeline.record_start(encoder, *tile);
                 let clip = clip.as_ref().map(|group| (&self.clip, group));
                 pipeline.record_ray(encoder, timers, view, *tile, clip);
                 self.compose.record(&mut pipeline.recorder(encoder, timers, view, *tile), &compose);

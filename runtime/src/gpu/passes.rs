@@ -17,7 +17,7 @@ pub(super) mod slopes;
 pub(super) mod splat;
 pub(super) mod surface;
 
-use wgpu::{BindGroup, CommandEncoder, ComputePassDescriptor, ComputePipeline};
+use wgpu::{BindGroup, Buffer, CommandEncoder, ComputePassDescriptor, ComputePipeline};
 
 use super::timers::{Pass, Timers};
 
@@ -35,6 +35,12 @@ impl Recorder<'_> {
     /// Workgroups of 8 × 8 that cover the tile.
     fn pixel_groups(&self) -> [u32; 2] {
         self.tile.map(|n| n.div_ceil(8))
+    }
+
+    /// Clears what a buffer keeps for the tile, so many bytes a pixel.
+    fn clear_pixels(&mut self, buffer: &Buffer, bytes: u64) {
+        let pixels = u64::from(self.tile[0]) * u64::from(self.tile[1]);
+        self.encoder.clear_buffer(buffer, 0, Some(bytes * pixels));
     }
 
     /// Points a render pass at the tile and the shared group.

@@ -136,7 +136,7 @@ impl PictureRenderer {
         }
         for (t, &tile) in tiles.iter().enumerate() {
             if first == 0 {
-                self.passes.record_start(encoder);
+                self.passes.record_start(encoder, tile);
             }
             let views = t * offsets.len()..(t + 1) * offsets.len();
             for view in views.clone() {

@@ -14,7 +14,7 @@ use super::passes::segments::Segments;
 use super::passes::slopes::Slopes;
 use super::passes::splat::Splat;
 use super::passes::surface::Surface;
-use super::targets::{TOTAL, Targets, budget};
+use super::targets::{COUNTERS, RADIANCE, TOTAL, Targets, budget};
 use super::tiles::{Tile, split};
 use super::timers::Timers;
 use super::uniforms::{LightLayout, ViewUniform};
@@ -345,10 +345,11 @@ impl Pipeline {
     }
 
     /// Records the start of a tile: an empty picture.
-    pub(super) fn record_start(&self, encoder: &mut CommandEncoder) {
+    pub(super) fn record_start(&self, encoder: &mut CommandEncoder, tile: Tile) {
         let Some((targets, _)) = &self.targets else { return };
-        encoder.clear_buffer(&targets.radiance, 0, None);
-        encoder.clear_buffer(&targets.counters, 0, None);
+        for (buffer, bytes) in [(&targets.radiance, RADIANCE), (&targets.counters, COUNTERS)] {
+            encoder.clear_buffer(buffer, 0, Some(bytes * tile.pixels()));
+        }
     }
 
     /// Records one ray of every pixel of a tile, added to the picture.

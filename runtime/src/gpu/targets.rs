@@ -15,7 +15,7 @@ pub(super) const SUM_FORMAT: TextureFormat = TextureFormat::Rgba32Float;
 /// Format of the attachment that the surface pass does not write.
 pub(super) const MARKER_FORMAT: TextureFormat = TextureFormat::R8Unorm;
 /// Bytes of one piece's indirect arguments: a draw (four words), a dispatch over cells of 8 × 8 pixels (three, one unused), one
-/// over tiles of 16 × 16.
+/// over the listed tiles of 16 × 16.
 pub(super) const ARGUMENTS: u64 = 48;
 /// Where the dispatches are in them.
 pub(super) const OVER_CELLS: u64 = 16;
@@ -24,10 +24,16 @@ pub(super) const OVER_TILES: u64 = 32;
 /// State of all pixels together stays below this, so that large pictures leave memory to others.
 pub(super) const TOTAL: u64 = 512 << 20;
 
-const CROSSINGS: u64 = 40;
-const BOUNDARY: u64 = 48;
+/// Bytes of a pixel in the buffers of these names.
+pub(super) const CROSSINGS: u64 = 40;
+pub(super) const BOUNDARY: u64 = 48;
+pub(super) const RADIANCE: u64 = 16;
+pub(super) const COUNTERS: u64 = 16;
 const PIECE: u64 = 16;
 const CELL: u64 = 8;
+/// Where the lists of tiles begin, and the bytes of one tile in them.
+const LISTS: u64 = 256;
+const LISTED: u64 = 4;
 const PROFILE: u64 = 16 * (PROFILE_CELLS as u64 + 1);
 
 /// Buffers and textures for a tile of a given number of columns and rows.
@@ -43,7 +49,11 @@ pub(super) struct Targets {
     pub radiance: Buffer,
     pub counters: Buffer,
     pub profile: Buffer,
+    /// Indirect arguments of each piece; then for each the tiles of 16 × 16 pixels that have it, and marks that no tile is
+    /// listed twice.
     pub arguments: Buffer,
+    /// Tiles, padded as `stride`.
+    tile_stride: u64,
     /// Cells of 8 × 8 pixels, padded as `stride`.
     cell_stride: u64,
     pub cells: Buffer,
@@ -94,6 +104,8 @@ impl Targets {
         let stride = pixels.next_multiple_of(16);
         let cell_stride =
             tile.size.iter().map(|n| u64::from(n.div_ceil(8))).product::<u64>().next_multiple_of(32);
+        let tile_stride =
+            tile.size.iter().map(|n| u64::from(n.div_ceil(16))).product::<u64>().next_multiple_of(64);
         let state = BufferUsages::STORAGE | BufferUsages::COPY_DST;
         let read = state | BufferUsages::COPY_SRC;
         let buffer = |label: &str, size: u64, usage| empty_buffer(device, label, size, usage);
@@ -119,10 +131,15 @@ impl Targets {
             boundary: buffer("boundary", if needs.fresnel { BOUNDARY * pixels } else { 0 }, state),
             pieces: buffer("pieces", PIECE * MAX_PIECES as u64 * stride, read),
             front: buffer("front", 16 * pixels, state),
-            radiance: buffer("radiance", 16 * pixels, read),
-            counters: buffer("counters", 16 * pixels, read),
+            radiance: buffer("radiance", RADIANCE * pixels, read),
+            counters: buffer("counters", COUNTERS * pixels, read),
             profile: buffer("profile", if needs.heterogeneous { PROFILE * stride } else { 0 }, state),
-            arguments: buffer("arguments", ARGUMENTS * MAX_PIECES as u64, state | BufferUsages::INDIRECT),
+            arguments: buffer(
+                "arguments",
+                LISTS + 2 * MAX_PIECES as u64 * LISTED * tile_stride,
+                state | BufferUsages::INDIRECT,
+            ),
+            tile_stride,
             cells: buffer("cells", CELL * MAX_PIECES as u64 * cell_stride, state),
             cell_stride,
             marker: texture("marker", MARKER_FORMAT, tile.size),
@@ -146,6 +163,15 @@ impl Targets {
             buffer: &self.cells,
             offset: k as u64 * self.cell_stride * CELL,
             size: wgpu::BufferSize::new(self.cell_stride * CELL),
+        })
+    }
+
+    /// The list of tiles that have piece `k`.
+    pub fn tiles(&self, k: usize) -> wgpu::BindingResource<'_> {
+        wgpu::BindingResource::Buffer(BufferBinding {
+            buffer: &self.arguments,
+            offset: LISTS + k as u64 * self.tile_stride * LISTED,
+            size: wgpu::BufferSize::new(self.tile_stride * LISTED),
         })
     }
 

@@ -6,9 +6,10 @@
 // side in each half of the tile. How those that are listed are added, `add_listed`, and the entry point follow in
 // gather_lanes.wgsl or gather_plain.wgsl.
 
-@group(1) @binding(0) var<storage, read> samples: array<vec4f>;  // position, sharpness
+// Position and sharpness of each sample, then a sphere around the kernels of each cluster of 64.
+@group(1) @binding(0) var<storage, read> samples: array<vec4f>;
 @group(1) @binding(1) var<storage, read> sources: array<vec4f>;  // SOURCE a sample: v, weight; slopes
-@group(1) @binding(2) var<storage, read> clusters: array<vec4f>; // a sphere around 64 kernels each
+@group(1) @binding(2) var<storage, read> tiles: array<u32>;      // column and row of those with pixels inside, 16 bits each
 @group(1) @binding(3) var<storage, read> piece: array<vec4f>;
 @group(1) @binding(4) var<storage, read> profile: array<vec4f>;
 @group(1) @binding(5) var<storage, read_write> front: array<vec4f>;
@@ -183,6 +184,11 @@ fn list_marked(local: u32, before: u32, base: u32) {
     }
 }
 
+// The tile of a workgroup.
+fn tile_of(group: u32) -> vec2u {
+    return vec2u(tiles[group] & 0xffffu, tiles[group] >> 16u);
+}
+
 // One of 64 threads of a tile; `lane` of `lanes` that can talk.
 fn gather(tile: vec2u, local: u32, lane: u32, lanes: u32) {
     if (local < WORDS) {
@@ -214,7 +220,7 @@ fn gather(tile: vec2u, local: u32, lane: u32, lanes: u32) {
     let total = (medium.samples + CLUSTER - 1u) / CLUSTER;
     for (var first = 0u; first < total; first += ROUND) {
         for (var bit = local; bit < min(ROUND, total - first); bit += CLUSTER) {
-            let sphere = clusters[first + bit];
+            let sphere = samples[medium.samples + first + bit];
             if (sphere.w > 0.0 && may_meet(cone, sphere.xyz - view.origin, sphere.w)) {
                 mark(bit);
             }

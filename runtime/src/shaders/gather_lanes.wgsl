@@ -34,10 +34,10 @@ fn add_listed(before: PairSums, count: u32, lane: u32, lanes: u32, rays: Pair) -
 
 @compute @workgroup_size(64)
 fn gather_by_lanes(
-    @builtin(workgroup_id) tile: vec3u,
+    @builtin(workgroup_id) group: vec3u,
     @builtin(local_invocation_index) local: u32,
     @builtin(subgroup_invocation_id) lane: u32,
     @builtin(subgroup_size) lanes: u32,
 ) {
-    gather(tile.xy, local, lane, lanes);
+    gather(tile_of(group.x), local, lane, lanes);
 }

@@ -7,7 +7,8 @@ const SLOTS: u32 = 8u;
 const STATE: u32 = 10u;
 const BOUNDARY: u32 = 12u;
 const MAX_PIECES: u32 = 4u;
-const ARGUMENTS: u32 = 12u; // draw (4), dispatch over 8 x 8 pixels (3), unused, over 16 x 16 (3), unused
+const ARGUMENTS: u32 = 12u; // draw (4), dispatch over 8 x 8 pixels (3), unused, over listed tiles (3), unused
+const LISTS: u32 = 64u;     // where the lists of tiles of each piece begin; then come a mark for every tile and piece
 
 @group(1) @binding(0) var<storage, read> crossings: array<u32>;
 @group(1) @binding(1) var<storage, read> boundary: array<f32>;
@@ -57,6 +58,21 @@ fn segments(
             range = vec2f(bitcast<f32>(start), bitcast<f32>(atomicLoad(&cell_end[local])));
         }
         cells[local * stride + cell.y * cell_count.x + cell.x] = range;
+        if (range.x <= range.y) {
+            list_tile(local, cell.xy / 2u, (cell_count.x + 1u) / 2u);
+        }
+    }
+}
+
+// Lists a tile of 16 x 16 pixels that have piece k, once.
+fn list_tile(k: u32, tile: vec2u, columns: u32) {
+    let stride = (arrayLength(&arguments) - LISTS) / (2u * MAX_PIECES);
+    let mark = LISTS + (MAX_PIECES + k) * stride + tile.y * columns + tile.x;
+    if (atomicExchange(&arguments[mark], 1u) == 0u) {
+        let place = atomicAdd(&arguments[k * ARGUMENTS + 8u], 1u);
+        atomicStore(&arguments[LISTS + k * stride + place], tile.x | (tile.y << 16u));
+        atomicMax(&arguments[k * ARGUMENTS + 9u], 1u);
+        atomicMax(&arguments[k * ARGUMENTS + 10u], 1u);
     }
 }
 
@@ -101,14 +117,10 @@ fn cut(index: u32) {
             pieces[k * stride + index] = vec4f(0.0);
         } else if (atomicLoad(&arguments[k * ARGUMENTS]) == 0u) {
             let groups = (view.tile_size + vec2u(7u)) / 8u;
-            let large = (view.tile_size + vec2u(15u)) / 16u;
             atomicMax(&arguments[k * ARGUMENTS + 1u], medium.samples);
             atomicMax(&arguments[k * ARGUMENTS + 4u], groups.x);
             atomicMax(&arguments[k * ARGUMENTS + 5u], groups.y);
             atomicMax(&arguments[k * ARGUMENTS + 6u], 1u);
-            atomicMax(&arguments[k * ARGUMENTS + 8u], large.x);
-            atomicMax(&arguments[k * ARGUMENTS + 9u], large.y);
-            atomicMax(&arguments[k * ARGUMENTS + 10u], 1u);
             atomicMax(&arguments[k * ARGUMENTS], 6u);
         }
     }

@@ -4,7 +4,7 @@ use super::super::asset::AssetBuffers;
 use super::super::bindings::{Slot, group, layout, pipeline_layout};
 use super::super::frame::FrameBuffers;
 use super::super::shaders;
-use super::super::targets::Targets;
+use super::super::targets::{BOUNDARY, Targets};
 use super::super::timers::Pass;
 use super::Recorder;
 use super::surface::{draw_mesh, mesh_pipeline};
@@ -48,7 +48,7 @@ impl Boundary {
     }
 
     pub fn record(&self, r: &mut Recorder, group: &BindGroup, asset: &AssetBuffers, targets: &Targets) {
-        r.encoder.clear_buffer(&targets.boundary, 0, None);
+        r.clear_pixels(&targets.boundary, BOUNDARY);
         draw_mesh(r, Pass::Boundary, &self.pipeline, group, asset, targets);
     }
 }

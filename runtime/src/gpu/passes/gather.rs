@@ -57,7 +57,7 @@ impl Gather {
         let resources = vec![
             asset.samples.as_entire_binding(),
             asset.sources.as_entire_binding(),
-            asset.clusters.as_entire_binding(),
+            t.tiles(piece),
             t.piece(piece),
             t.profile.as_entire_binding(),
             t.front.as_entire_binding(),

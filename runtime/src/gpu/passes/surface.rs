@@ -3,7 +3,7 @@
 use super::super::asset::AssetBuffers;
 use super::super::bindings::{Slot, group, layout, options, pipeline_layout};
 use super::super::shaders;
-use super::super::targets::{MARKER_FORMAT, Targets};
+use super::super::targets::{CROSSINGS, MARKER_FORMAT, Targets};
 use super::super::timers::Pass;
 use super::Recorder;
 use wgpu::{
@@ -40,7 +40,7 @@ impl Surface {
     }
 
     pub fn record(&self, r: &mut Recorder, group: &BindGroup, asset: &AssetBuffers, targets: &Targets) {
-        r.encoder.clear_buffer(&targets.crossings, 0, None);
+        r.clear_pixels(&targets.crossings, CROSSINGS);
         draw_mesh(r, Pass::Surface, &self.pipeline, group, asset, targets);
     }
 }
