@@ -17,7 +17,7 @@ use glam::{DQuat, DVec3, Mat4, Vec3, camera, dcamera};
 use half::f16;
 
 const SIZE: [u32; 2] = [112, 96];
-const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba16Float;
+pub const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba16Float;
 
 fn projection(camera: &Camera) -> Mat4 {
     let fov = camera.vertical_fov_degrees.to_radians() as f32;
@@ -29,7 +29,7 @@ fn host_camera(camera: &Camera) -> HostCamera {
     HostCamera::new(view, projection(camera)).unwrap()
 }
 
-fn host_frame<'a>(scene: &'a Scene, depth: Option<HostDepth<'a>>) -> HostFrame<'a> {
+pub fn host_frame<'a>(scene: &'a Scene, depth: Option<HostDepth<'a>>) -> HostFrame<'a> {
     HostFrame {
         size: SIZE,
         camera: host_camera(&scene.camera),
@@ -46,7 +46,7 @@ fn device() -> Option<GpuDevice> {
     gpu(&ball().build()).map(|_| GpuDevice::open(&instance(), None).unwrap())
 }
 
-fn texture(device: &wgpu::Device, format: wgpu::TextureFormat) -> wgpu::Texture {
+pub fn texture(device: &wgpu::Device, format: wgpu::TextureFormat) -> wgpu::Texture {
     device.create_texture(&wgpu::TextureDescriptor {
         label: None,
         size: wgpu::Extent3d { width: SIZE[0], height: SIZE[1], depth_or_array_layers: 1 },

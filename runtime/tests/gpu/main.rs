@@ -2,6 +2,7 @@
 //! DIAPHANE_REQUIRE_GPU=1 asks them to fail.
 
 mod edits;
+mod endurance;
 mod host;
 mod objects;
 mod scenes;
