@@ -7,15 +7,17 @@ mod broken;
 use broken::{Intended, Kind, all};
 use diaphane_bake::params::{Params, Preset};
 use diaphane_bake::{Input, bake, progress::Silent};
+use diaphane_formats::asset::Asset;
 use diaphane_formats::medium::{Density, Medium};
-use diaphane_formats::mesh::{Mesh, MeshReport, parse_obj};
+use diaphane_formats::mesh::{Mending, Mesh, MeshReport, parse_obj};
 use diaphane_formats::phase::Phase;
 use diaphane_formats::picture::Picture;
 use diaphane_formats::scene::{Scene, parse_scene};
 use diaphane_runtime::player::{Backend, LightMode};
 use glam::DVec3;
+use proptest::prelude::*;
 use rayon::prelude::*;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 use std::path::Path;
 use validation::metrics::compare;
 use validation::play::play;
@@ -39,8 +41,7 @@ fn medium() -> Medium {
     Medium::new(DVec3::splat(1.5), DVec3::splat(0.8), Phase::Isotropic, 1.0, Density::Uniform(1.0)).unwrap()
 }
 
-/// Bakes and plays on the CPU.
-fn played(mesh: &Mesh, mesh_report: &MeshReport) -> Picture {
+fn baked(mesh: &Mesh, mesh_report: &MeshReport, samples: usize) -> diaphane_bake::Result<Asset> {
     let input = Input {
         mesh,
         mesh_report,
@@ -49,9 +50,17 @@ fn played(mesh: &Mesh, mesh_report: &MeshReport) -> Picture {
         material_name: String::new(),
     };
     let preset = Params::preset(Preset::Draft);
-    let params = Params { samples: 1_500, directions: 64, certificate: false, ..preset };
-    let asset = bake(&input, &params, &Silent).unwrap().0;
-    play(&asset, &scene(), Backend::Cpu, LightMode::Baked, 1).unwrap().picture
+    let params = Params { samples, directions: 64, certificate: false, ..preset };
+    Ok(bake(&input, &params, &Silent)?.0)
+}
+
+/// Played on the CPU.
+fn picture(asset: &Asset) -> Picture {
+    play(asset, &scene(), Backend::Cpu, LightMode::Baked, 1).unwrap().picture
+}
+
+fn played(mesh: &Mesh, mesh_report: &MeshReport) -> Picture {
+    picture(&baked(mesh, mesh_report, 1_500).unwrap())
 }
 
 /// A clean shape by the reference, and the error of its own bake.
@@ -120,4 +129,68 @@ fn each_kind_is_baked_as_what_was_meant_or_refused() {
     }
     assert!(kinds.len() >= 40);
     assert_eq!(wrong, 0, "of {} kinds", kinds.len());
+}
+
+#[test]
+fn clean_shapes_come_out_as_they_were() {
+    let shapes = Intended::ALL.into_iter().map(Intended::shape).chain([diaphane_assets::shapes::bird()]);
+    for shape in shapes {
+        let (mesh, report) = Mesh::from_triangles(shape.positions.clone(), shape.triangles.clone()).unwrap();
+        let corners = |t: &[u32; 3], positions: &[DVec3]| t.map(|v| positions[v as usize]);
+        assert_eq!(report.flipped + report.holes + report.degenerate + report.duplicate, 0);
+        assert_eq!(report.mending, Mending::default());
+        let given = shape.triangles.iter().map(|t| corners(t, &shape.positions));
+        assert!(mesh.triangles.iter().map(|t| corners(t, &mesh.positions)).eq(given));
+    }
+}
+
+/// Whether every directed edge has as many opposites.
+fn is_closed(mesh: &Mesh) -> bool {
+    let mut balance: HashMap<[u32; 2], i32> = HashMap::new();
+    for &[a, b, c] in &mesh.triangles {
+        for (a, b) in [(a, b), (b, c), (c, a)] {
+            *balance.entry([a.min(b), a.max(b)]).or_default() += if a < b { 1 } else { -1 };
+        }
+    }
+    balance.values().all(|n| *n == 0)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(400))]
+
+    /// Triangles between points of a small lattice: most edges are shared by many, most faces cross or touch others.
+    #[test]
+    fn any_triangles_become_a_closed_mesh_or_one_line(
+        triangles in proptest::collection::vec(proptest::array::uniform3(0u32..27), 1..60)
+    ) {
+        let at = |i: i32| DVec3::new(f64::from(i % 3), f64::from(i / 3 % 3), f64::from(i / 9)) - 1.0;
+        match Mesh::from_triangles((0..27).map(at).collect(), triangles) {
+            Ok((mesh, report)) => {
+                prop_assert!(is_closed(&mesh));
+                prop_assert!(mesh.positions.iter().all(|p| p.is_finite()));
+                prop_assert_eq!((report.vertices, report.triangles), (mesh.positions.len(), mesh.triangles.len()));
+            }
+            Err(e) => prop_assert_eq!(e.to_string().lines().count(), 1),
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(6))]
+
+    #[test]
+    fn any_triangles_are_baked_to_finite_pictures_or_refused(
+        triangles in proptest::collection::vec(proptest::array::uniform3(0u32..27), 20..60)
+    ) {
+        let at = |i: i32| 0.6 * (DVec3::new(f64::from(i % 3), f64::from(i / 3 % 3), f64::from(i / 9)) - 1.0);
+        if let Ok((mesh, report)) = Mesh::from_triangles((0..27).map(at).collect(), triangles) {
+            match baked(&mesh, &report, 200) {
+                Ok(asset) => {
+                    let picture = picture(&asset);
+                    prop_assert!(picture.pixels.iter().flatten().all(|v| v.is_finite()));
+                }
+                Err(e) => prop_assert_eq!(e.to_string().lines().count(), 1),
+            }
+        }
+    }
 }

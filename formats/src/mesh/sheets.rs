@@ -82,8 +82,9 @@ pub(super) fn find(
         let own = faces(p);
         let tree = Winding::new(own.clone());
         let plain = |q: DVec3| since.iter().map(|t| solid_angle(t, q)).sum::<f64>() / (4.0 * PI);
-        let others = means_beside(&own, |q| all.at(q) - tree.at(q) - plain(q));
-        if others.iter().all(|w| (w.abs() - 0.5).abs() < NEEDED) {
+        let [front, back] = means_beside(&own, |q| all.at(q) - tree.at(q) - plain(q));
+        let is_needed = (0.5 * (front + back).abs() - 0.5).abs() < NEEDED && (front - back).abs() < NEEDED;
+        if is_needed {
             continue;
         }
         pieces.members[p].iter().for_each(|t| gone[*t as usize] = true);
