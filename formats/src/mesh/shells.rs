@@ -11,6 +11,7 @@ use super::winding::Winding;
 use glam::DVec3;
 use rayon::prelude::*;
 use std::collections::HashMap;
+use std::sync::OnceLock;
 
 /// Share of a shell's faces that must lie in another for the shell to count as within it.
 const WITHIN: f64 = 0.9;
@@ -36,7 +37,10 @@ pub(super) struct Shell {
     volume: f64,
     /// Places just behind some of its faces.
     witnesses: Vec<DVec3>,
-    winding: Winding,
+    /// Empty where there are no other shells.
+    corners: Vec<[DVec3; 3]>,
+    /// Made when a shell near this one asks for it.
+    winding: OnceLock<Winding>,
 }
 
 /// What becomes of a shell.
@@ -115,7 +119,8 @@ impl Shell {
             high,
             volume,
             witnesses: Vec::new(),
-            winding: Winding::new(Vec::new()),
+            corners: Vec::new(),
+            winding: OnceLock::new(),
         };
         if several {
             let behind = |[a, b, c]: &[DVec3; 3]| {
@@ -124,7 +129,7 @@ impl Shell {
             };
             let step = corners.len().div_ceil(FACES).max(1);
             shell.witnesses = corners.iter().step_by(step).map(behind).collect();
-            shell.winding = Winding::new(corners);
+            shell.corners = corners;
         }
         shell
     }
@@ -138,7 +143,8 @@ impl Shell {
         if self.high.cmplt(other.low).any() || self.low.cmpgt(other.high).any() {
             return 0.0;
         }
-        let inside = self.witnesses.iter().filter(|p| other.winding.at(**p).abs() > 0.5).count();
+        let winding = other.winding.get_or_init(|| Winding::new(other.corners.clone()));
+        let inside = self.witnesses.iter().filter(|p| winding.at(**p).abs() > 0.5).count();
         inside as f64 / self.witnesses.len().max(1) as f64
     }
 }

@@ -6,13 +6,15 @@
 //!
 //! with a, b, c the corners of triangle t seen from q (mesh units) and Ω its signed solid angle in sr. 1 inside a closed
 //! surface with outward normals, 0 outside, in between where faces are missing. Jacobson, Kavan and Sorkine-Hornung 2013
-//! ("Robust inside-outside segmentation using generalized winding numbers", equations 5 and 6), after van Oosterom and
-//! Strackee 1983 (equation 8).
+//! ("Robust inside-outside segmentation using generalized winding numbers", ACM Trans. Graph. 32(4), article 33); the solid
+//! angle after van Oosterom and Strackee 1983 ("The solid angle of a plane triangle", IEEE Trans. Biomed. Eng. 30, p. 125,
+//! equation 8).
 //!
 //! The hierarchical form replaces triangles far away by a dipole at their centre, Σ A_t n_t · (c - q) / (4π |c - q|³):
 //! the first term of the expansion of Barill, Dickson, Schmidt, Levin and Jacobson 2018 ("Fast winding numbers for soups
-//! and clouds", section 3), of a node no further than `far` radii taken apart. Deviation: centres are weighted with area,
-//! nodes are halves of the triangles along the longest axis. Checked against the plain sum below.
+//! and clouds", ACM Trans. Graph. 37(4), article 43). Deviation: their further terms are left out, nodes must be further
+//! away instead. Nodes are halves of the triangles along the longest axis, centres are weighted with area. Checked against
+//! the plain sum below.
 
 use glam::DVec3;
 use std::f64::consts::PI;
