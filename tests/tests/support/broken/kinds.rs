@@ -45,6 +45,7 @@ fn holes() -> Vec<Kind> {
         kind("all faces around a vertex missing", Ball, count, |t| without_star(t, 100)),
         kind("one face in fifty missing", Ball, count, |t| pierced(t, 0.02)),
         kind("one face in fifty of a torus missing", Torus, count, |t| pierced(t, 0.02)),
+        kind("one face in five missing", Ball, count, |t| pierced(t, 0.2)),
         kind("box without lid", Box, count, |t| without(t, |p| p.y > 0.62)),
         kind("box without lid and bottom", Box, count, |t| without(t, |p| p.y.abs() > 0.62)),
         kind("a corner missing", Box, count, |t| without(t, |p| p.dot(DVec3::ONE) > 1.6)),
@@ -142,6 +143,7 @@ fn non_manifold() -> Vec<Kind> {
     vec![
         kind("fins outside", Ball, count, |t| with_fins(t, 40, 1.15)),
         kind("fins inside", Ball, count, |t| with_fins(t, 40, 0.7)),
+        kind("fins on both shells, inside out", Hollow, count, |t| with_fins(reversed(t), 50, 1.1)),
         kind("fins, inside out", Torus, count, |t| with_fins(reversed(t), 60, 1.1)),
         kind("a wall across", Bar, count, |t| joined(&[t, wall()])),
         kind("a wall across, inside out", Bar, count, |t| joined(&[reversed(t), wall()])),
@@ -187,6 +189,9 @@ fn crossings() -> Vec<Kind> {
             let [a, b] = pair(0.35, 0.6);
             joined(&[reversed(a), b])
         }),
+        kind("two balls through each other, holes", Peanut, count, |_| {
+            pierced(joined(&pair(0.35, 0.6)), 0.01)
+        }),
         kind("a torus through itself", Apple, count, |_| torus(0.4, 0.55, 48, 32)),
         kind("a torus through itself, inside out", Apple, count, |_| reversed(torus(0.4, 0.55, 48, 32))),
         kind(
@@ -216,6 +221,10 @@ fn shells() -> Vec<Kind> {
     let count = |r: &MeshReport| r.mending.nested;
     vec![
         kind("a ball in a ball", Ball, count, |t| joined(&[t, icosphere(0.5, 3)])),
+        kind("two balls side by side in a ball", Ball, count, |t| {
+            let [a, b] = pair(0.4, 0.3);
+            joined(&[a, t, b])
+        }),
         kind("three balls in each other", Ball, count, |t| {
             joined(&[icosphere(0.3, 2), t, icosphere(0.6, 3)])
         }),
