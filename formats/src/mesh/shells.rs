@@ -73,11 +73,11 @@ pub(super) fn gather(
     }
     let mut slot = vec![usize::MAX; parent.len()];
     let mut joined: Vec<(Vec<u32>, bool)> = Vec::new();
-    for p in 0..parent.len() {
+    for (p, &open) in open.iter().enumerate() {
         let r = root(&mut parent, p);
         if slot[r] == usize::MAX {
             slot[r] = joined.len();
-            joined.push((Vec::new(), open[p]));
+            joined.push((Vec::new(), open));
         }
         joined[slot[r]].0.extend(&pieces.members[p]);
     }
