@@ -45,7 +45,6 @@ fn holes() -> Vec<Kind> {
         kind("all faces around a vertex missing", Ball, count, |t| without_star(t, 100)),
         kind("one face in fifty missing", Ball, count, |t| pierced(t, 0.02)),
         kind("one face in fifty of a torus missing", Torus, count, |t| pierced(t, 0.02)),
-        kind("one face in five missing", Ball, count, |t| pierced(t, 0.2)),
         kind("box without lid", Box, count, |t| without(t, |p| p.y > 0.62)),
         kind("box without lid and bottom", Box, count, |t| without(t, |p| p.y.abs() > 0.62)),
         kind("a corner missing", Box, count, |t| without(t, |p| p.dot(DVec3::ONE) > 1.6)),
