@@ -84,7 +84,7 @@ pub fn bake(input: &Input<'_>, params: &Params, progress: &dyn Progress) -> Resu
     memory::required(input, params)?;
     let cache = Cache::open(params.cache.as_deref())?;
     let timed = Timed::new(progress);
-    let mut params = params.clone();
+    let mut params = field::suited(input, params);
     let mut goal = Goal::default();
     loop {
         let baked = Pipeline::new(input, &params, &cache, &timed).run()?;

@@ -73,7 +73,8 @@ pub enum Representation {
     Lobe,
 }
 
-/// How the optical depth of many points along one direction is found; the result is the same.
+/// How the optical depth of many points along one direction is found; the result is the same. Where shells of the mesh
+/// overlap a bake traces, whatever was asked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub enum Visibility {
     /// Whichever should be faster for so many points and triangles.

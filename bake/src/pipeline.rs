@@ -70,7 +70,7 @@ struct Keys {
 impl Keys {
     fn new(input: &Input<'_>, params: &Params) -> Result<Self> {
         let p = params;
-        let object = (input.mesh.content_hash(), input.medium.optical_hash());
+        let object = (input.mesh.content_hash(), input.mesh_report.is_mended(), input.medium.optical_hash());
         let density = p.directions.min(DENSITY_DIRECTIONS);
         let placing = (object, p.samples, p.seed, p.placement, p.visibility, density, p.width_factor);
         let boundary = fit::boundary_order(input.medium.ior(), p.order);
@@ -128,6 +128,7 @@ impl<'a> Pipeline<'a> {
             dark,
             discarded,
             visibility: self.method(placed.samples.len()),
+            tested: self.shape.get().map(|s| s.inside.tested()).unwrap_or_default(),
         };
         let report = Report::new(&params, &facts, &asset, &self.timed.seconds.borrow(), self.cache.report());
         Ok((asset, report))
@@ -137,7 +138,9 @@ impl<'a> Pipeline<'a> {
         if let Some(shape) = self.shape.get() {
             return Ok(shape);
         }
-        let made = self.timed.stage("mesh", |_| Ok(Shape::new(self.input.mesh, self.params)))?;
+        let made = self
+            .timed
+            .stage("mesh", |_| Ok(Shape::new(self.input.mesh, self.input.mesh_report, self.params)))?;
         Ok(self.shape.get_or_init(|| made))
     }
 
@@ -157,7 +160,10 @@ impl<'a> Pipeline<'a> {
         let (params, timed) = (self.params, self.timed);
         let (shape, medium) = (self.shape()?, self.medium()?);
         let cells = grid_cells(shape.mesh, params.samples);
-        let key = Key::new("distance field", &(shape.mesh.content_hash(), cells))?;
+        let key = Key::new(
+            "distance field",
+            &(shape.mesh.content_hash(), self.input.mesh_report.is_mended(), cells),
+        )?;
         let grid =
             self.cache.get(&key, || timed.stage("distance field", |p| DistanceGrid::new(shape, cells, p)))?;
         let skipped = grid.skipped;

@@ -67,6 +67,8 @@ pub struct Report {
     pub layers: usize,
     /// What was skipped because nothing needed it.
     pub skipped: BTreeMap<String, usize>,
+    /// Points tested for being inside, each way; what a cache held was not tested again.
+    pub inside_tests: Tested,
     /// What was mended in the mesh, in sentences.
     pub warnings: Vec<String>,
     /// What refinement did; `None` where it was not asked for.
@@ -81,6 +83,15 @@ pub struct Report {
     pub memory: MemoryReport,
 }
 
+/// How many points were tested each way.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Tested {
+    /// Along three lines each.
+    pub by_majority: usize,
+    /// By generalized winding numbers.
+    pub by_winding_number: usize,
+}
+
 /// What the stages tell.
 pub(crate) struct Facts<'a> {
     pub medium: &'a Medium,
@@ -93,6 +104,7 @@ pub(crate) struct Facts<'a> {
     pub dark: usize,
     pub discarded: usize,
     pub visibility: Visibility,
+    pub tested: Tested,
 }
 
 /// Coefficients that samples do not need, of as many as `order` bands for all would take.
@@ -147,6 +159,7 @@ impl Report {
             snapped: facts.placed.snapped,
             layers: facts.layers,
             skipped,
+            inside_tests: facts.tested,
             refinement: facts.refinement.clone(),
             certificate: asset.info.certificate,
             shortfalls,

@@ -5,6 +5,7 @@ mod workbench;
 
 use diaphane_formats::asset::{Asset, encode, parse, parse_level, section_sizes};
 use diaphane_formats::medium::{Density, Grid, Medium};
+use diaphane_formats::mesh::Mending;
 use diaphane_formats::phase::Phase;
 use glam::DVec3;
 use proptest::prelude::*;
@@ -45,6 +46,20 @@ fn round_trip() {
     // A bake rounds to what the file holds: nothing is lost by writing.
     assert_eq!(read, asset);
     assert_eq!(encode(&read).unwrap(), bytes);
+}
+
+#[test]
+fn rare_repairs_of_the_mesh_have_a_section_of_their_own() {
+    let mut asset = asset();
+    let has = |bytes: &[u8]| section_sizes(bytes).unwrap().iter().any(|(n, _)| *n == "mending");
+    assert!(!has(&encode(&asset).unwrap()));
+    let counts = [1, 2, 3, 4, 5, 6];
+    asset.info.provenance.mesh_report.mending = Mending::from_counts(counts);
+    let bytes = encode(&asset).unwrap();
+    assert!(has(&bytes));
+    let read = parse(&bytes).unwrap();
+    assert_eq!(read, asset);
+    assert_eq!(read.info.provenance.mesh_report.mending.counts(), counts);
 }
 
 #[test]

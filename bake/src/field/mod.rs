@@ -1,17 +1,19 @@
 //! The signed distance field of the mesh on a regular grid, and exact queries behind it.
 //!
-//! Depth is positive inside. Inside is decided by majority over three directions of projected winding numbers; the
-//! distance by closest-point queries on the box hierarchy. Outside nodes further than two cells from the surface are
+//! Depth is positive inside. Inside is decided by [`inside`]; the distance by closest-point queries on the box hierarchy. Outside nodes further than two cells from the surface are
 //! not needed by anyone and are skipped.
+
+mod inside;
+mod overlap;
+
+pub(crate) use inside::Inside;
+pub(crate) use overlap::suited;
 
 use crate::params::{Params, Visibility};
 use crate::progress::Stage;
 use crate::{Error, Result};
-use diaphane_formats::directions::even_directions;
-use diaphane_formats::medium::{Density, Medium};
-use diaphane_formats::mesh::Mesh;
-use diaphane_formats::phase::Phase;
-use diaphane_formats::visibility::{Accel, project};
+use diaphane_formats::mesh::{Mesh, MeshReport};
+use diaphane_formats::visibility::Accel;
 use glam::DVec3;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -20,6 +22,7 @@ use serde::{Deserialize, Serialize};
 pub(crate) struct Shape<'a> {
     pub mesh: &'a Mesh,
     pub accel: Accel,
+    pub inside: Inside<'a>,
     pub diagonal: f64,
     /// Mean distance between samples if they filled the volume evenly.
     pub spacing: f64,
@@ -66,10 +69,11 @@ impl DistanceGrid {
 }
 
 impl<'a> Shape<'a> {
-    pub fn new(mesh: &'a Mesh, params: &Params) -> Self {
+    pub fn new(mesh: &'a Mesh, report: &MeshReport, params: &Params) -> Self {
         let spacing = (mesh.volume() / params.samples as f64).cbrt();
         let (accel, visibility) = (Accel::new(mesh), params.visibility);
-        Self { mesh, accel, diagonal: mesh.diagonal(), spacing, visibility }
+        let inside = Inside::new(mesh, report);
+        Self { mesh, accel, inside, diagonal: mesh.diagonal(), spacing, visibility }
     }
 }
 
@@ -93,7 +97,7 @@ impl DistanceGrid {
         let count = size.iter().product::<usize>();
         stage.announce(count);
         let nodes: Vec<DVec3> = (0..count).map(|i| grid.node(i)).collect();
-        let inside = inside_nodes(mesh, &nodes)?;
+        let inside = shape.inside.test(&nodes)?;
         let skipped = std::sync::atomic::AtomicUsize::new(0);
         let band = 2.0 * cell;
         let chunk = 4096;
@@ -128,34 +132,4 @@ impl DistanceGrid {
         grid.skipped = skipped.into_inner();
         Ok(grid)
     }
-}
-
-/// Points of one task of [`inside_nodes`], at the least.
-const VOTING: usize = 1 << 15;
-
-/// Majority vote over three lines through each node, each seen from both ends. The third is looked along only where the
-/// first two leave it open.
-pub(crate) fn inside_nodes(mesh: &Mesh, nodes: &[DVec3]) -> Result<Vec<bool>> {
-    let unit = Medium::new(DVec3::ONE, DVec3::ZERO, Phase::Isotropic, 1.0, Density::Uniform(1.0))?;
-    let axes = even_directions(6, 0x5eed);
-    let vote = |nodes: &[DVec3], axis: usize, votes: &mut dyn FnMut(usize)| {
-        let sides = project(mesh, &unit, nodes, axes[2 * axis]).winding;
-        sides.iter().for_each(|w| w.iter().enumerate().filter(|(_, w)| **w > 0).for_each(|(i, _)| votes(i)));
-    };
-    // Every task goes through all triangles.
-    let together = VOTING.max(mesh.triangles.len() / 4);
-    let votes: Vec<Vec<u8>> = nodes
-        .par_chunks(together)
-        .map(|nodes| {
-            let mut votes = vec![0u8; nodes.len()];
-            (0..2).for_each(|axis| vote(nodes, axis, &mut |i| votes[i] += 1));
-            let open: Vec<usize> = (0..nodes.len()).filter(|i| matches!(votes[*i], 2 | 3)).collect();
-            let places: Vec<DVec3> = open.iter().map(|i| nodes[*i]).collect();
-            if !places.is_empty() {
-                vote(&places, 2, &mut |k| votes[open[k]] += 1);
-            }
-            votes
-        })
-        .collect();
-    Ok(votes.concat().into_iter().map(|votes| votes > 3).collect())
 }

@@ -10,7 +10,7 @@
 //! random for each sample: any run of consecutive ones is spread well.
 
 use crate::Result;
-use crate::field::{Shape, inside_nodes};
+use crate::field::Shape;
 use crate::samples::Candidate;
 use diaphane_formats::directions::hash;
 use diaphane_formats::medium::Medium;
@@ -71,7 +71,7 @@ impl Cells {
         };
         let doubtful: Vec<usize> = (0..samples.len()).filter(|i| !buried[*i]).collect();
         let tested: Vec<DVec3> = doubtful.par_iter().flat_map_iter(|i| tries(*i)).collect();
-        let inside = inside_nodes(shape.mesh, &tested)?;
+        let inside = shape.inside.test(&tested)?;
         let mut row = vec![usize::MAX; samples.len()];
         doubtful.iter().enumerate().for_each(|(k, i)| row[*i] = k);
         let by_sample: Vec<DVec3> = samples

@@ -78,7 +78,7 @@ mod tests {
     use crate::{Prepared, density};
     use diaphane_assets::shapes::icosphere;
     use diaphane_formats::medium::Density;
-    use diaphane_formats::mesh::Mesh;
+    use diaphane_formats::mesh::{Mesh, MeshReport};
     use diaphane_formats::phase::Phase;
 
     #[test]
@@ -86,7 +86,7 @@ mod tests {
         let raw = icosphere(1.0, 4);
         let mesh = Mesh::from_triangles(raw.positions, raw.triangles).unwrap().0;
         let params = Params { samples: 3_000, ..Params::default() };
-        let shape = Shape::new(&mesh, &params);
+        let shape = Shape::new(&mesh, &MeshReport::default(), &params);
         let timed = Timed::new(&Silent);
         let grid = timed.stage("grid", |p| DistanceGrid::new(&shape, 40.0, p)).unwrap();
         let medium = |kappa: f64| {

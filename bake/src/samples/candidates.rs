@@ -2,7 +2,7 @@
 
 use super::{Candidate, Ground};
 use crate::density::LayerFluence;
-use crate::field::{DistanceGrid, Shape, inside_nodes};
+use crate::field::{DistanceGrid, Shape};
 use crate::layers::Layer;
 use crate::params::{BOUNDARY_SNAP, DARK, Params, Placement, RADIUS_EXPONENT};
 use crate::progress::Stage;
@@ -247,7 +247,7 @@ fn usable(
         .collect();
     let doubtful: Vec<DVec3> =
         list.iter().zip(&certain).filter(|(_, c)| c.is_none()).map(|(c, _)| c.position).collect();
-    let mut tested = inside_nodes(shape.mesh, &doubtful)?.into_iter();
+    let mut tested = shape.inside.test(&doubtful)?.into_iter();
     let kept = |known: &Option<bool>| known.unwrap_or_else(|| tested.next().unwrap_or(false));
     let keep: Vec<bool> = certain.iter().map(kept).collect();
     let kept = list.iter().zip(keep).filter(|(_, keep)| *keep).map(|(c, _)| *c).collect();

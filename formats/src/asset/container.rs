@@ -62,10 +62,12 @@ pub(super) enum Kind {
     Lobe = 14,
     /// f32 a level but the finest, the coarsest first: width factor.
     LevelWidth = 15,
+    /// u64 each: counts of rarer repairs of the mesh; absent where all are 0.
+    Mending = 16,
 }
 
 impl Kind {
-    pub(super) const ALL: [(Self, &'static str); 15] = [
+    pub(super) const ALL: [(Self, &'static str); 16] = [
         (Self::Info, "info"),
         (Self::LevelWidth, "level_width"),
         (Self::Place, "place"),
@@ -81,6 +83,7 @@ impl Kind {
         (Self::MeshPositions, "mesh_positions"),
         (Self::MeshTriangles, "mesh_triangles"),
         (Self::Density, "density"),
+        (Self::Mending, "mending"),
     ];
 }
 

@@ -4,6 +4,7 @@ use super::container::{Kind, SHARED, Section, Table};
 use super::levels::no_level;
 use super::{Asset, DensityGrid, FORMAT_VERSION, HAS_LOBE, Info, Level, Places, Samples, codec};
 use crate::harmonics::Harmonics;
+use crate::mesh::Mending;
 use crate::{Error, Result, files, lobe};
 use glam::Vec3;
 use half::f16;
@@ -165,6 +166,9 @@ impl<'a> Parts<'a> {
         if widths.len() + 1 != usize::from(self.all) {
             return Err(Error::invalid("the asset's levels of detail and their widths do not fit together"));
         }
+        if let Some(bytes) = self.find(Kind::Mending, SHARED)? {
+            info.provenance.mesh_report.mending = mending(bytes)?;
+        }
         let samples = self.samples(&info)?;
         // A coarser level: the metadata are those of all samples.
         if let Some(width_factor) = widths.get(usize::from(self.last) - 1) {
@@ -228,6 +232,12 @@ fn halves(bytes: &[u8]) -> Result<Vec<f16>> {
 fn groups<T: Copy, const N: usize>(values: &[T]) -> Result<Vec<[T; N]>> {
     let (chunks, []) = values.as_chunks::<N>() else { return Err(ragged()) };
     Ok(chunks.to_vec())
+}
+
+fn mending(bytes: &[u8]) -> Result<Mending> {
+    let (chunks, []) = bytes.as_chunks::<8>() else { return Err(ragged()) };
+    let counts: [u64; 6] = std::array::from_fn(|k| chunks.get(k).map_or(0, |c| u64::from_le_bytes(*c)));
+    if chunks.len() == counts.len() { Ok(Mending::from_counts(counts)) } else { Err(ragged()) }
 }
 
 fn density(bytes: &[u8]) -> Result<DensityGrid> {

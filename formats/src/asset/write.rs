@@ -3,6 +3,7 @@
 use super::container::{self, Draft, Kind, SHARED};
 use super::{Asset, FORMAT_VERSION, HAS_LOBE, Places, Samples, codec};
 use crate::harmonics::Harmonics;
+use crate::mesh::Mending;
 use crate::{Result, files, lobe};
 use glam::Vec3;
 use half::f16;
@@ -62,6 +63,10 @@ fn shared(asset: &Asset) -> Result<Vec<Draft>> {
         bytes.extend(floats(grid.min.iter().chain(&grid.max).copied()));
         bytes.extend(halves(grid.values.iter().flatten().copied()));
         sections.push((Kind::Density, bytes));
+    }
+    let mending = &asset.info.provenance.mesh_report.mending;
+    if *mending != Mending::default() {
+        sections.push((Kind::Mending, mending.counts().into_iter().flat_map(u64::to_le_bytes).collect()));
     }
     Ok(sections.into_iter().map(|(kind, data)| Draft { kind, part: SHARED, data }).collect())
 }

@@ -1,12 +1,20 @@
 //! Triangle meshes: reading OBJ, repairing what can be repaired, and saying what was found.
 
+mod close;
 mod load;
+mod pieces;
 mod repair;
 mod report;
+mod seams;
 mod self_intersection;
+mod sheets;
+mod shells;
+mod weld;
+mod winding;
 
 pub use load::{load_obj, parse_obj};
-pub use report::MeshReport;
+pub use report::{Mending, MeshReport};
+pub use winding::Winding;
 
 use crate::{Error, Result};
 use glam::DVec3;

@@ -16,8 +16,28 @@ pub struct Depth {
     pub winding: i32,
 }
 
+/// Leaves only the crossings at which the inside begins or ends, so that the medium counts once where shells overlap.
+/// `crossings` are all of a ray's; they stay as they are, in their order, where none overlap.
+pub(super) fn count_once(crossings: &mut Vec<Crossing>) {
+    let mut winding: i32 = crossings.iter().map(|c| c.sign).sum();
+    if crossings.len() < 2 || (crossings.len() == 2 && winding == 0) {
+        return;
+    }
+    let mut sorted = crossings.clone();
+    // Exits before entries at equal distance: touching shells do not overlap.
+    sorted.sort_unstable_by(|a, b| a.t.total_cmp(&b.t).then(b.sign.cmp(&a.sign)));
+    sorted.retain(|c| {
+        let before = winding > 0;
+        winding -= c.sign;
+        before != (winding > 0)
+    });
+    if sorted.len() < crossings.len() {
+        *crossings = sorted;
+    }
+}
+
 /// Depth of `origin` along the unit vector `direction` up to distance `limit` (infinity for a distant light), by the
-/// signed sum over crossings: no sorting. `scratch` is reused between calls.
+/// signed sum over crossings: no sorting unless shells may overlap. `scratch` is reused between calls.
 ///
 /// A point within rounding of the surface may miss its own exit: that exit would add 0, so nothing is lost.
 /// Where the light itself is inside (`limit` finite) the piece that it ends is closed there.
@@ -30,9 +50,10 @@ pub fn depth_along(
     scratch: &mut Vec<Crossing>,
 ) -> Depth {
     accel.crossings(origin, direction, 0.0, f64::INFINITY, scratch);
-    let mut depth = Depth { density_length: 0.0, boundary: 1.0, winding: 0 };
+    let winding = scratch.iter().map(|c| c.sign).sum();
+    let mut depth = Depth { density_length: 0.0, boundary: 1.0, winding };
+    count_once(scratch);
     for c in scratch.iter() {
-        depth.winding += c.sign;
         let t = c.t.min(limit);
         depth.density_length += f64::from(c.sign) * medium.density_length(origin, direction, 0.0, t);
         if c.t < limit && medium.ior() != 1.0 {
@@ -85,6 +106,45 @@ pub fn inside_pieces(
                 open = None;
             }
             _ => {}
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn crossings(list: &[(f64, i32)]) -> Vec<Crossing> {
+        list.iter().map(|&(t, sign)| Crossing { t, sign, triangle: 0 }).collect()
+    }
+
+    fn once(list: &[(f64, i32)]) -> Vec<(f64, i32)> {
+        let mut all = crossings(list);
+        count_once(&mut all);
+        all.iter().map(|c| (c.t, c.sign)).collect()
+    }
+
+    #[test]
+    fn overlapping_shells_count_once() {
+        // From within two shells to the outer one's end; through two that overlap; through one and then within another.
+        assert_eq!(once(&[(2.0, 1), (1.0, 1)]), [(2.0, 1)]);
+        assert_eq!(once(&[(1.0, -1), (3.0, 1), (2.0, -1), (4.0, 1)]), [(1.0, -1), (4.0, 1)]);
+        assert_eq!(
+            once(&[(1.0, 1), (2.0, -1), (3.0, -1), (4.0, 1), (5.0, 1)]),
+            [(1.0, 1), (2.0, -1), (5.0, 1)]
+        );
+    }
+
+    #[test]
+    fn crossings_without_overlap_keep_their_order() {
+        for list in [
+            &[(4.0, 1), (1.0, 1), (2.0, -1)][..],
+            &[(1.0, -1), (2.0, 1)],
+            &[(1.0, 1)],
+            &[],
+            &[(3.0, -1), (4.0, 1), (1.0, -1), (3.0, 1)],
+        ] {
+            assert_eq!(once(list), list);
         }
     }
 }

@@ -1,7 +1,9 @@
-//! What [`project`](super::project()) computes, by rays through the box hierarchy: the oracle of the projection, and the
-//! faster way for few points in a large mesh.
+//! What [`project`](super::project()) computes, by rays through the box hierarchy: the oracle of the projection, the
+//! faster way for few points in a large mesh, and the only one where shells overlap: the medium counts once there, which
+//! takes sorting.
 
 use super::along::Along;
+use super::rays::count_once;
 use super::{Accel, Crossing, DepthRows};
 use crate::fresnel;
 use crate::medium::{Medium, SampledDensity};
@@ -31,9 +33,10 @@ pub fn trace(
         for side in 0..2 {
             let turn = if side == 0 { 1.0 } else { -1.0 };
             accel.crossings(*point, turn * direction, 0.0, f64::INFINITY, &mut crossings);
-            let (mut depth, mut winding) = (0.0, 0);
+            let winding: i32 = crossings.iter().map(|c| c.sign).sum();
+            count_once(&mut crossings);
+            let mut depth = 0.0;
             for c in &crossings {
-                winding += c.sign;
                 depth += f64::from(c.sign) * turn * along.integral(i, turn * c.t);
                 if !matched {
                     let cosine = accel.normal(c.triangle).dot(direction);
