@@ -17,6 +17,10 @@ const ENVIRONMENT_ORDER: usize = 10;
 /// A light's distance is clamped from below at this fraction of the diagonal.
 pub const LEAST_DISTANCE: f64 = 1e-3;
 
+/// Irradiance is limited to this, per light and channel, so that sums over lights, samples and rays stay within single
+/// precision.
+pub const MOST_IRRADIANCE: f32 = 1e30;
+
 /// Camera, lights and surface of one frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Frame {
@@ -95,18 +99,28 @@ impl FrameLight {
     /// Unit direction from `x` to the light, distance (infinite for directional lights) and unattenuated irradiance.
     pub fn at(&self, x: Vec3, least: f32) -> (Vec3, f32, Vec3) {
         if self.kind == LightKind::Directional {
-            return (-self.direction, f32::INFINITY, self.colour);
+            return (-self.direction, f32::INFINITY, limited(self.colour));
         }
         let d = self.position - x;
         let distance = d.length();
         let to = if distance > 0.0 { d / distance } else { Vec3::Y };
         let clamped = distance.max(least);
-        let mut irradiance = self.colour / (clamped * clamped);
+        let mut irradiance = limited(self.colour / (clamped * clamped));
         if self.kind == LightKind::Spot {
             irradiance *= cone(self.cos_outer, self.cos_inner, -to.dot(self.direction));
         }
         (to, distance, irradiance)
     }
+}
+
+fn limited(irradiance: Vec3) -> Vec3 {
+    irradiance.clamp(Vec3::splat(-MOST_IRRADIANCE), Vec3::splat(MOST_IRRADIANCE))
+}
+
+/// In single precision, whose range it does not leave.
+fn narrowed(colour: DVec3) -> Vec3 {
+    let most = DVec3::splat(f64::from(f32::MAX));
+    colour.clamp(-most, most).as_vec3()
 }
 
 /// smoothstep(cos outer, cos inner, cosine), a step where both angles are equal.
@@ -148,6 +162,12 @@ impl Frame {
         })
     }
 
+    /// v of a sample is limited to this. Its variation over a kernel multiplies it by e^8 at the most (see
+    /// [`diaphane_formats::slopes`]), and weights along a ray add up to about ten diagonals: sums stay below 3e37.
+    pub fn most_source(&self) -> f32 {
+        1e33 / (self.least_distance * 1000.0).max(1.0)
+    }
+
     /// Share of the lights that the baked means serve: the others have exact depths at the centroids.
     pub fn share_of_means(&self, exact: Option<&ExactDepths>) -> f32 {
         let count = self.lights.len();
@@ -177,19 +197,19 @@ pub(crate) fn frame_light(light: &Light, centre: DVec3) -> FrameLight {
     };
     match *light {
         Light::Point { position, intensity } => {
-            FrameLight { position: local(position), colour: intensity.as_vec3(), ..base }
+            FrameLight { position: local(position), colour: narrowed(intensity), ..base }
         }
         Light::Directional { direction, irradiance } => FrameLight {
             kind: LightKind::Directional,
             direction: direction.as_vec3(),
-            colour: irradiance.as_vec3(),
+            colour: narrowed(irradiance),
             ..base
         },
         Light::Spot { position, direction, intensity, cos_inner, cos_outer } => FrameLight {
             kind: LightKind::Spot,
             position: local(position),
             direction: direction.as_vec3(),
-            colour: intensity.as_vec3(),
+            colour: narrowed(intensity),
             cos_inner: cos_inner as f32,
             cos_outer: cos_outer as f32,
         },
@@ -212,7 +232,7 @@ pub fn environment_lights(environment: &Environment) -> Vec<FrameLight> {
                 kind: LightKind::Directional,
                 position: Vec3::ZERO,
                 direction: -towards.as_vec3(),
-                colour: (radiance * solid_angle).as_vec3(),
+                colour: narrowed(radiance * solid_angle),
                 cos_inner: -1.0,
                 cos_outer: -1.0,
             }

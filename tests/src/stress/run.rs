@@ -1,0 +1,125 @@
+//! Runs the matrix: bodies one after the other, the scatterings of a body side by side.
+
+use super::axes::Scattering;
+use super::body::{Baked, bake_body};
+use super::check::{Findings, Subject, dyed};
+use super::plan::{Body, Cell, Plan};
+use super::table::{Line, Report};
+use diaphane_bake::progress::Progress;
+use diaphane_formats::asset::Asset;
+use diaphane_runtime::Error;
+use diaphane_runtime::gpu::GpuRenderer;
+use rayon::prelude::*;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
+
+/// What to check beside the CPU.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Settings {
+    /// Whether the GPU draws every cell as well, where there is an adapter.
+    pub gpu: bool,
+}
+
+/// Runs a plan; `done` is called with the name of every body once its cells are checked, and how many these are.
+pub fn run(plan: &Plan, settings: Settings, progress: &dyn Progress, done: &dyn Fn(&str, usize)) -> Report {
+    let begun = Instant::now();
+    let gpu = AtomicBool::new(settings.gpu);
+    let mut report = Report::default();
+    if !settings.gpu {
+        report.skip("gpu", "not asked for", plan.cells());
+    }
+    for (body, cells) in &plan.bodies {
+        let name = body.name();
+        match caught(|| bake_body(body, progress)) {
+            Ok(Ok(baked)) => {
+                report.bakes += 1;
+                let lines = check_cells(&name, &baked, cells, &gpu);
+                lines.into_iter().for_each(|line| report.add(line));
+            }
+            Ok(Err(e)) => refused(body, &name, &e.to_string(), cells, &mut report),
+            Err(panic) => {
+                for cell in cells {
+                    report.add(broken(&name, cell, "panic", format!("in the bake: {panic}")));
+                }
+            }
+        }
+        done(&name, cells.len());
+    }
+    if settings.gpu && !gpu.load(Ordering::Relaxed) {
+        report.skip("gpu", "no adapter", plan.cells());
+    }
+    report.seconds = begun.elapsed().as_secs_f64();
+    report
+}
+
+/// A medium that neither scatters nor absorbs has no samples: one clear line is what its cells should show.
+fn refused(body: &Body, name: &str, why: &str, cells: &[Cell], report: &mut Report) {
+    let expected = body.extinction == 0.0 && why.lines().count() == 1;
+    for cell in cells {
+        if expected {
+            report.add(Line::new(name, cell, Findings::default()));
+            report.skip("picture", "without extinction there is nothing to bake; refused in one line", 1);
+        } else {
+            report.add(broken(name, cell, "bake", why.to_owned()));
+        }
+    }
+}
+
+/// Scatterings side by side, each with its own renderer.
+fn check_cells(name: &str, baked: &Baked, cells: &[Cell], gpu: &AtomicBool) -> Vec<Line> {
+    let mut scatterings: Vec<Scattering> = Vec::new();
+    for cell in cells {
+        if !scatterings.contains(&cell.scattering) {
+            scatterings.push(cell.scattering);
+        }
+    }
+    let lines = scatterings.par_iter().with_max_len(1).map(|scattering| {
+        let own: Vec<&Cell> = cells.iter().filter(|c| c.scattering == *scattering).collect();
+        let asset = dyed(&baked.asset, *scattering);
+        match caught(|| Subject::new(baked, &asset, renderer(&asset, gpu)?)) {
+            Ok(Ok(mut subject)) => own.iter().map(|cell| check(name, &mut subject, cell)).collect(),
+            Ok(Err(e)) => own.iter().map(|cell| broken(name, cell, "bake", e.to_string())).collect(),
+            Err(e) => own.iter().map(|cell| broken(name, cell, "panic", e.clone())).collect::<Vec<_>>(),
+        }
+    });
+    lines.flatten().collect()
+}
+
+fn check(name: &str, subject: &mut Subject, cell: &Cell) -> Line {
+    match caught(|| subject.check(cell)) {
+        Ok(Ok(findings)) => Line::new(name, cell, findings),
+        Ok(Err(e)) => broken(name, cell, "finite", e.to_string()),
+        Err(e) => broken(name, cell, "panic", e),
+    }
+}
+
+/// A GPU's renderer where one is wanted; the first that finds no adapter is the last that looks for one.
+fn renderer(asset: &Asset, gpu: &AtomicBool) -> diaphane_runtime::Result<Option<GpuRenderer>> {
+    if !gpu.load(Ordering::Relaxed) {
+        return Ok(None);
+    }
+    match GpuRenderer::new(asset, None) {
+        Ok(renderer) => Ok(Some(renderer)),
+        Err(Error::NoAdapter(_)) => {
+            gpu.store(false, Ordering::Relaxed);
+            Ok(None)
+        }
+        Err(e) => Err(e),
+    }
+}
+
+fn broken(name: &str, cell: &Cell, check: &'static str, what: String) -> Line {
+    let mut findings = Findings::default();
+    findings.fail(check, what);
+    Line::new(name, cell, findings)
+}
+
+/// What a panic said, on one line.
+fn caught<T>(work: impl FnOnce() -> T) -> Result<T, String> {
+    catch_unwind(AssertUnwindSafe(work)).map_err(|payload| {
+        let text = payload.downcast_ref::<String>().cloned();
+        let text = text.or_else(|| payload.downcast_ref::<&str>().map(|s| (*s).to_owned()));
+        text.unwrap_or_else(|| "a panic without words".to_owned()).replace('\n', " ")
+    })
+}
