@@ -185,7 +185,8 @@ impl Lighting {
                     self.arriving(i, to, basis)
                 }
             };
-            sum += irradiance * arriving * henyey_greenstein_f32(self.g, -to, towards_camera).0;
+            let g = self.g.clamp(-prepared.light.most_cosine, prepared.light.most_cosine);
+            sum += irradiance * arriving * henyey_greenstein_f32(g, -to, towards_camera).0;
         }
         sum * self.albedo
     }

@@ -27,7 +27,8 @@ impl Ambient {
         for light in lights {
             let to = -light.direction;
             sh::evaluate(bands, to.as_dvec3().to_array(), &mut basis);
-            let (phase, slope) = henyey_greenstein(g, -to, towards_camera);
+            let own = g.clamp(-light.most_cosine, light.most_cosine);
+            let (phase, slope) = henyey_greenstein(own, -to, towards_camera);
             for v in 0..vectors {
                 let factor = if v == 0 { phase } else { -slope * to[v - 1] };
                 let colour = (light.colour * factor).as_dvec3().to_array();

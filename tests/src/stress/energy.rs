@@ -23,12 +23,17 @@ pub const ROUNDING: f64 = 2e-5;
 /// harmonics (the quadrature's error, which a test of the frame measures as well).
 pub const PROJECTION: f64 = 1e-3;
 
+/// Share by which the sum over an environment's directions may exceed the integral where the phase function is not
+/// isotropic, see [`diaphane_runtime::frame::ENVIRONMENT_MEAN_COSINE`].
+pub const DIRECTIONS: f64 = 0.033;
+
 /// The bound for every channel of a scene of an asset, rounding included.
 pub fn most_radiance(scene: &Scene, info: &Info) -> DVec3 {
     let g = info.phase.mean_cosine().abs();
     let albedo = DVec3::from(info.albedo);
     if scene.environment.is_some() {
-        return albedo * FURNACE * (1.0 + PROJECTION + ROUNDING);
+        let directions = if g == 0.0 { 0.0 } else { DIRECTIONS };
+        return albedo * FURNACE * (1.0 + directions + PROJECTION + ROUNDING);
     }
     let most_phase = (1.0 + g) / (4.0 * PI * (1.0 - g).powi(2));
     let irradiance: DVec3 = scene.lights.iter().map(|light| most_irradiance(light, info)).sum();

@@ -3,7 +3,7 @@
 use super::axes::Scattering;
 use super::body::{Baked, bake_body};
 use super::check::{Findings, Subject, dyed};
-use super::plan::{Body, Cell, Plan};
+use super::plan::{Body, Cell, PLAIN, Plan};
 use super::table::{Line, Report};
 use diaphane_bake::progress::Progress;
 use diaphane_formats::asset::Asset;
@@ -31,13 +31,20 @@ pub fn run(plan: &Plan, settings: Settings, progress: &dyn Progress, done: &dyn 
     }
     for (body, cells) in &plan.bodies {
         let name = body.name();
-        match caught(|| bake_body(body, progress)) {
-            Ok(Ok(baked)) => {
+        match caught(|| baked_or_edited(body, progress)) {
+            Ok(Ok((baked, refused))) => {
                 report.bakes += 1;
+                if refused {
+                    report.skip("bake", REFUSED, cells.len());
+                }
                 let lines = check_cells(&name, &baked, cells, &gpu);
                 lines.into_iter().for_each(|line| report.add(line));
             }
-            Ok(Err(e)) => refused(body, &name, &e.to_string(), cells, &mut report),
+            Ok(Err(e)) => {
+                for cell in cells {
+                    report.add(broken(&name, cell, "bake", e.to_string()));
+                }
+            }
             Err(panic) => {
                 for cell in cells {
                     report.add(broken(&name, cell, "panic", format!("in the bake: {panic}")));
@@ -53,18 +60,27 @@ pub fn run(plan: &Plan, settings: Settings, progress: &dyn Progress, done: &dyn 
     report
 }
 
-/// A medium that neither scatters nor absorbs has no samples: one clear line is what its cells should show.
-fn refused(body: &Body, name: &str, why: &str, cells: &[Cell], report: &mut Report) {
-    let expected = body.extinction == 0.0 && why.lines().count() == 1;
-    for cell in cells {
-        if expected {
-            report.add(Line::new(name, cell, Findings::default()));
-            report.skip("picture", "without extinction there is nothing to bake; refused in one line", 1);
-        } else {
-            report.add(broken(name, cell, "bake", why.to_owned()));
+/// What is said of bodies that are too dense for a bake.
+const REFUSED: &str = "light reaches no sample of so dense a body, which the bake says in one line; \
+                       played from a bake of the plain extinction, edited";
+
+/// A baked body. Where its medium is so dense that the bake finds no light at any sample, one line must say so; then the
+/// plain extinction is baked and raised when played, as a player's user may. Tells whether that was so.
+fn baked_or_edited(body: &Body, progress: &dyn Progress) -> diaphane_bake::Result<(Baked, bool)> {
+    match bake_body(body, progress) {
+        Err(diaphane_bake::Error::NoRoom(why)) if body.extinction > OPAQUE && why.lines().count() == 1 => {
+            let mut baked = bake_body(&Body { extinction: PLAIN.extinction, ..*body }, progress)?;
+            let factor = body.extinction / PLAIN.extinction;
+            baked.asset.info.extinction.iter_mut().for_each(|e| *e *= factor);
+            Ok((baked, true))
         }
+        other => Ok((other?, false)),
     }
 }
+
+/// Extinction times diagonal from which a bake may find no light inside: a mean free path is below what positions in an
+/// asset can tell apart.
+const OPAQUE: f64 = 1e5;
 
 /// Scatterings side by side, each with its own renderer.
 fn check_cells(name: &str, baked: &Baked, cells: &[Cell], gpu: &AtomicBool) -> Vec<Line> {

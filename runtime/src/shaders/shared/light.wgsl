@@ -7,6 +7,7 @@ struct Light {
     colour: vec3f,
     cos_outer: f32,
     table: u32,             // which exact depth table replaces the spherical harmonics; NO_TABLE: none
+    most_cosine: f32,       // limit of the phase function's mean cosine, up and down
 }
 
 const NO_TABLE: u32 = 0xffffffffu;

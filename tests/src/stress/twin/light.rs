@@ -91,7 +91,8 @@ impl Twin<'_> {
         } else {
             0.0
         };
-        let p = phase(self.asset.info.phase.mean_cosine(), -to, towards, off + turn);
+        let g = limited(self.asset.info.phase.mean_cosine(), light);
+        let p = phase(g, -to, towards, off + turn);
         let psi = self.arriving(i, to, off);
         let colour = light.colour.as_dvec3();
         std::array::from_fn(|c| {
@@ -159,6 +160,7 @@ impl Twin<'_> {
         for light in folded.iter().map(|l| &frame.lights[*l]) {
             let to = -light.direction.as_dvec3();
             sh::evaluate(linear::BANDS, to.to_array(), &mut basis);
+            let g = limited(g, light);
             let p = phase(g, -to, towards, 0.0).value;
             let base = (1.0 - g).powi(2) + 2.0 * g * (1.0 + to.dot(towards));
             let slope = 3.0 * g * p / base;
@@ -232,6 +234,12 @@ impl Twin<'_> {
 
 /// Rounding of a projected coefficient: ∫|Y| ≤ 3.6 times the mean rounding of ψ and of a sum of 392 terms.
 const PROJECTED: f64 = 3.6 * 400.0 * U;
+
+/// The phase function's mean cosine for a light.
+fn limited(g: f64, light: &FrameLight) -> f64 {
+    let most = f64::from(light.most_cosine);
+    g.clamp(-most, most)
+}
 
 /// F of the folded lights: [coefficient][itself, changes along x, y, z][channel].
 struct Ambient {
