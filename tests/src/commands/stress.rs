@@ -10,11 +10,13 @@ use validation::stress::{self, Plan, Settings};
 
 /// Which cells, and where to.
 #[derive(clap::Args)]
-#[command(after_help = "Meshes, media, lights and cameras at the ends of what numbers can hold. Every body is baked once; \
+#[command(
+    after_help = "Meshes, media, lights and cameras at the ends of what numbers can hold. Every body is baked once; \
                         each of its cells must be finite, within the light that was put in, and as near to double \
                         precision as rounding allows; where there is a GPU it must agree with the CPU. Exit code 1 when \
                         a bound is broken.\n\nExamples:\n  diaphane-validate stress\n  diaphane-validate stress --subset \
-                        --json stress.json\n  diaphane-validate stress --filter \"ring: albedo 1 g 0.99\"")]
+                        --json stress.json\n  diaphane-validate stress --filter \"ring: albedo 1 g 0.99\""
+)]
 pub struct Arguments {
     /// A fixed part of the matrix, as tests run it
     #[arg(long)]

@@ -90,9 +90,11 @@ pub fn bake_body(body: &Body, progress: &dyn Progress) -> diaphane_bake::Result<
     };
     let extinction = channels * (body.extinction / diagonal);
     let medium = Medium::new(extinction, DVec3::ONE, Phase::Isotropic, body.ior, density)?;
+    let many = body.samples > 100_000;
     let params = Params {
         samples: body.samples,
-        directions: if body.samples > 100_000 { FEW_DIRECTIONS } else { DIRECTIONS },
+        directions: if many { FEW_DIRECTIONS } else { DIRECTIONS },
+        points_per_sample: if many { 1 } else { 4 },
         order: body.order,
         extra_bands: 0,
         certificate: false,

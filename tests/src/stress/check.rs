@@ -144,7 +144,9 @@ impl<'a> Subject<'a> {
         findings: &mut Findings,
     ) -> Vec<(usize, Seen)> {
         let Some(twin) = &self.twin else {
-            findings.skipped.push(("twin", "the density is a grid, which the player marches in single precision"));
+            findings
+                .skipped
+                .push(("twin", "the density is a grid, which the player marches in single precision"));
             return Vec::new();
         };
         let work = TWIN_WORK / self.asset.samples.len().max(1);
@@ -173,7 +175,7 @@ impl<'a> Subject<'a> {
                     );
                     findings.fail("twin", what);
                 }
-                if difference > 0.0 {
+                if difference > 0.0 && peak > 0.0 {
                     findings.twin_share = findings.twin_share.max(difference / error);
                     if !seen.vague {
                         findings.twin_error = findings.twin_error.max(difference / peak);
@@ -211,6 +213,10 @@ impl<'a> Subject<'a> {
         let Some(gpu) = &mut self.gpu else {
             return Ok(());
         };
+        if seen.is_empty() {
+            findings.skipped.push(("gpu", "no ray has a bound from the twin"));
+            return Ok(());
+        }
         let got = gpu.trace_rays(frame, None, [0.5; 2])?;
         if got.iter().flat_map(|r| r.radiance).any(|v| !(v.is_finite() && v >= 0.0)) {
             findings.fail("gpu", "values of the picture are negative or no number".to_owned());
@@ -230,7 +236,7 @@ impl<'a> Subject<'a> {
                     let what = format!("ray {i}: off by {:.2e} of the peak", difference / peak);
                     findings.fail("gpu", what);
                 }
-                if difference > 0.0 {
+                if difference > 0.0 && peak > 0.0 {
                     findings.gpu_error = findings.gpu_error.max(difference / peak);
                 }
             }

@@ -44,7 +44,9 @@ pub fn most_radiance(scene: &Scene, info: &Info) -> DVec3 {
 pub fn most_irradiance(light: &Light, info: &Info) -> DVec3 {
     let (position, intensity) = match *light {
         Light::Directional { irradiance, .. } => return irradiance,
-        Light::Point { position, intensity } | Light::Spot { position, intensity, .. } => (position, intensity),
+        Light::Point { position, intensity } | Light::Spot { position, intensity, .. } => {
+            (position, intensity)
+        }
     };
     let [low, high] = info.bounds.map(|b| Vec3::from(b).as_dvec3());
     let local = position - DVec3::from(info.centre);

@@ -3,15 +3,12 @@
 use super::axes::Scattering;
 use super::body::{Baked, bake_body};
 use super::check::{Findings, Subject, dyed};
+use super::gpu::{Gpu, SOFTWARE};
 use super::plan::{Body, Cell, PLAIN, Plan};
 use super::table::{Line, Report};
 use diaphane_bake::progress::Progress;
-use diaphane_formats::asset::Asset;
-use diaphane_runtime::Error;
-use diaphane_runtime::gpu::GpuRenderer;
 use rayon::prelude::*;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 /// What to check beside the CPU.
@@ -24,13 +21,14 @@ pub struct Settings {
 /// Runs a plan; `done` is called with the name of every body once its cells are checked, and how many these are.
 pub fn run(plan: &Plan, settings: Settings, progress: &dyn Progress, done: &dyn Fn(&str, usize)) -> Report {
     let begun = Instant::now();
-    let gpu = AtomicBool::new(settings.gpu);
+    let gpu = Gpu::new(settings.gpu);
     let mut report = Report::default();
     if !settings.gpu {
         report.skip("gpu", "not asked for", plan.cells());
     }
-    for (body, cells) in &plan.bodies {
+    for (b, (body, cells)) in plan.bodies.iter().enumerate() {
         let name = body.name();
+        gpu.next_body(b);
         match caught(|| baked_or_edited(body, progress)) {
             Ok(Ok((baked, refused))) => {
                 report.bakes += 1;
@@ -53,8 +51,12 @@ pub fn run(plan: &Plan, settings: Settings, progress: &dyn Progress, done: &dyn 
         }
         done(&name, cells.len());
     }
-    if settings.gpu && !gpu.load(Ordering::Relaxed) {
+    if gpu.is_missing() {
         report.skip("gpu", "no adapter", plan.cells());
+    } else if settings.gpu {
+        let drawn = report.lines.iter().filter(|l| l.findings.gpu_rays > 0).count();
+        let what = if gpu.is_software() { SOFTWARE } else { "no ray passes the object" };
+        report.skip("gpu", what, plan.cells() - drawn);
     }
     report.seconds = begun.elapsed().as_secs_f64();
     report
@@ -83,17 +85,17 @@ fn baked_or_edited(body: &Body, progress: &dyn Progress) -> diaphane_bake::Resul
 const OPAQUE: f64 = 1e5;
 
 /// Scatterings side by side, each with its own renderer.
-fn check_cells(name: &str, baked: &Baked, cells: &[Cell], gpu: &AtomicBool) -> Vec<Line> {
+fn check_cells(name: &str, baked: &Baked, cells: &[Cell], gpu: &Gpu) -> Vec<Line> {
     let mut scatterings: Vec<Scattering> = Vec::new();
     for cell in cells {
         if !scatterings.contains(&cell.scattering) {
             scatterings.push(cell.scattering);
         }
     }
-    let lines = scatterings.par_iter().with_max_len(1).map(|scattering| {
+    let lines = scatterings.par_iter().enumerate().with_max_len(1).map(|(s, scattering)| {
         let own: Vec<&Cell> = cells.iter().filter(|c| c.scattering == *scattering).collect();
         let asset = dyed(&baked.asset, *scattering);
-        match caught(|| Subject::new(baked, &asset, renderer(&asset, gpu)?)) {
+        match caught(|| Subject::new(baked, &asset, gpu.renderer(&asset, s)?)) {
             Ok(Ok(mut subject)) => own.iter().map(|cell| check(name, &mut subject, cell)).collect(),
             Ok(Err(e)) => own.iter().map(|cell| broken(name, cell, "bake", e.to_string())).collect(),
             Err(e) => own.iter().map(|cell| broken(name, cell, "panic", e.clone())).collect::<Vec<_>>(),
@@ -107,21 +109,6 @@ fn check(name: &str, subject: &mut Subject, cell: &Cell) -> Line {
         Ok(Ok(findings)) => Line::new(name, cell, findings),
         Ok(Err(e)) => broken(name, cell, "finite", e.to_string()),
         Err(e) => broken(name, cell, "panic", e),
-    }
-}
-
-/// A GPU's renderer where one is wanted; the first that finds no adapter is the last that looks for one.
-fn renderer(asset: &Asset, gpu: &AtomicBool) -> diaphane_runtime::Result<Option<GpuRenderer>> {
-    if !gpu.load(Ordering::Relaxed) {
-        return Ok(None);
-    }
-    match GpuRenderer::new(asset, None) {
-        Ok(renderer) => Ok(Some(renderer)),
-        Err(Error::NoAdapter(_)) => {
-            gpu.store(false, Ordering::Relaxed);
-            Ok(None)
-        }
-        Err(e) => Err(e),
     }
 }
 

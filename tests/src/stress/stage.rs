@@ -43,7 +43,8 @@ impl Stage {
         let normal = mesh.area_normal(largest).normalize_or(DVec3::Y);
         let count = asset.samples.len();
         let sample = |i: usize| centre + asset.samples.position(i.min(count.max(1) - 1)).as_dvec3();
-        let nearest = |p: DVec3| mesh.positions.iter().map(|q| q.distance_squared(p)).fold(f64::MAX, f64::min);
+        let nearest =
+            |p: DVec3| mesh.positions.iter().map(|q| q.distance_squared(p)).fold(f64::MAX, f64::min);
         let step = (count / 256).max(1);
         let deepest = (0..count)
             .step_by(step)
@@ -92,7 +93,9 @@ impl Stage {
             View::Narrow => (at(2.0), self.centre, 0.1),
             View::Wide => (at(2.0), self.centre, 179.0),
         };
-        Camera { position, target, up: DVec3::Y, vertical_fov_degrees }
+        let along = (target - position).normalize_or_zero();
+        let up = if along.y.abs() < 0.999 { DVec3::Y } else { DVec3::X };
+        Camera { position, target, up, vertical_fov_degrees }
     }
 
     fn light(&self, lights: Lights, scene: &mut Scene) {

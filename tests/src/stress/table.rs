@@ -80,7 +80,8 @@ impl Report {
             "body", "cells", "failed", "twin", "vague", "of bound", "energy", "gpu", "rays hit"
         );
         for (name, lines) in &bodies {
-            let most = |of: &dyn Fn(&Findings) -> f64| lines.iter().map(|l| of(&l.findings)).fold(0.0, f64::max);
+            let most =
+                |of: &dyn Fn(&Findings) -> f64| lines.iter().map(|l| of(&l.findings)).fold(0.0, f64::max);
             let sum = |of: &dyn Fn(&Findings) -> usize| lines.iter().map(|l| of(&l.findings)).sum::<usize>();
             let vague = 100.0 * sum(&|f| f.vague) as f64 / sum(&|f| f.compared).max(1) as f64;
             // Writing to a String cannot fail.

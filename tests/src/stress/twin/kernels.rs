@@ -59,9 +59,8 @@ impl Twin<'_> {
             for c in 0..3 {
                 let grey = c > 0 && medium.extinction[c] == medium.extinction[0];
                 let same = grey
-                    && (0..lit.value.len()).all(|i| {
-                        lit.value[i][c] == lit.value[i][0] && lit.slope[i][c] == lit.slope[i][0]
-                    });
+                    && (0..lit.value.len())
+                        .all(|i| lit.value[i][c] == lit.value[i][0] && lit.slope[i][c] == lit.slope[i][0]);
                 if same {
                     continue;
                 }
@@ -132,7 +131,8 @@ impl Twin<'_> {
             let bare = of.bare * dim;
             let mean_error = if bare > 1e-28 {
                 let e = dim / (a * bare);
-                ((1e-6 * e + 0.5 * e * e * OF_WEIGHT * (-a * a * d2).exp() + 2.0 * U * kappa / a) / a).min(length)
+                ((1e-6 * e + 0.5 * e * e * OF_WEIGHT * (-a * a * d2).exp() + 2.0 * U * kappa / a) / a)
+                    .min(length)
             } else {
                 length
             };

@@ -140,7 +140,8 @@ impl Twin<'_> {
             let range = ends.iter().map(|e| (e - value).abs()).fold(0.0, f64::max);
             let tau = decode(info.encoding, stored.value).min(1e3 / ratio.max(1e-30));
             // ε and the reciprocal round before their difference is taken.
-            let rounding = value * U * (4.0 + ratio * (3.0 * tau + 3.0 * reciprocal_size(info.encoding, tau)));
+            let rounding =
+                value * U * (4.0 + ratio * (3.0 * tau + 3.0 * reciprocal_size(info.encoding, tau)));
             let error = range + rounding;
             Bounded {
                 value: value * through.value,
@@ -182,11 +183,8 @@ impl Twin<'_> {
         let folded = self.folded.get_or_init(|| self.fold());
         let g = self.asset.info.phase.mean_cosine();
         let deviation = (origin - self.place[i]).normalize_or_zero() - origin.normalize_or_zero();
-        let factors = if g == 0.0 {
-            [1.0, 0.0, 0.0, 0.0]
-        } else {
-            [1.0, deviation.x, deviation.y, deviation.z]
-        };
+        let factors =
+            if g == 0.0 { [1.0, 0.0, 0.0, 0.0] } else { [1.0, deviation.x, deviation.y, deviation.z] };
         for c in 0..3 {
             let (mut value, mut error) = (0.0, 0.0);
             for (k, t) in folded.0[i][c].iter().enumerate() {
@@ -196,7 +194,10 @@ impl Twin<'_> {
                 // Coefficients are rounded to f16 (half a unit of 2^-10, 2^-24 at the least); p as the phase's head.
                 let rounded = t.abs() * 2f64.powi(-11) + 2f64.powi(-24);
                 let of_f = size * U * (16.0 + 16.0 * g.abs() / (1.0 - g.abs()).powi(2));
-                error += rounded * f.abs() + (t.abs() + rounded) * of_f + PROJECTED * f.abs() + U * 200.0 * t.abs() * f.abs();
+                error += rounded * f.abs()
+                    + (t.abs() + rounded) * of_f
+                    + PROJECTED * f.abs()
+                    + U * 200.0 * t.abs() * f.abs();
             }
             sum[c].value += value.max(0.0);
             sum[c].error += error;

@@ -85,7 +85,8 @@ impl Twin<'_> {
         let size = inverse.x_axis.length() + inverse.y_axis.length() + inverse.z_axis.length();
         // A product with an explicit inverse is off by the matrix' condition times the error of its entries, which hold
         // differences of places, relative to |M⁻¹| |w d| (Higham, section 14.1).
-        let place = offsets.iter().map(|d| self.place[i].length() / d.length().max(1e-30)).fold(0.0, f64::max);
+        let place =
+            offsets.iter().map(|d| self.place[i].length() / d.length().max(1e-30)).fold(0.0, f64::max);
         let condition = trace * size;
         let relative = condition * U * (20.0 + 4.0 * place.min(1e6));
         let each = |(j, d): (&usize, &DVec3)| {
