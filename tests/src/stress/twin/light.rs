@@ -37,7 +37,7 @@ impl Twin<'_> {
             .map(|i| {
                 let mut sum = [Bounded::default(); 3];
                 for light in plan.single.iter().map(|l| &frame.lights[*l]) {
-                    let one = self.from_light(i, light, origin, f64::from(frame.least_distance));
+                    let one = self.light_of(i, light, origin, f64::from(frame.least_distance));
                     (0..3).for_each(|c| {
                         sum[c].value += one[c].value;
                         sum[c].error += one[c].error;
@@ -58,7 +58,7 @@ impl Twin<'_> {
             .collect()
     }
 
-    fn from_light(&self, i: usize, light: &FrameLight, origin: DVec3, least: f64) -> [Bounded; 3] {
+    fn light_of(&self, i: usize, light: &FrameLight, origin: DVec3, least: f64) -> [Bounded; 3] {
         let place = self.place[i];
         let blur = 2.0 * U * (self.centre[i].length() + place.length());
         let (to, off, fall, fall_error) = if light.kind == LightKind::Directional {
@@ -185,7 +185,7 @@ impl Twin<'_> {
         let deviation = (origin - self.place[i]).normalize_or_zero() - origin.normalize_or_zero();
         let factors =
             if g == 0.0 { [1.0, 0.0, 0.0, 0.0] } else { [1.0, deviation.x, deviation.y, deviation.z] };
-        for c in 0..3 {
+        for (c, sum) in sum.iter_mut().enumerate() {
             let (mut value, mut error) = (0.0, 0.0);
             for (k, t) in folded.0[i][c].iter().enumerate() {
                 let f: f64 = (0..4).map(|v| factors[v] * ambient.values[k][v][c]).sum();
@@ -199,8 +199,8 @@ impl Twin<'_> {
                     + PROJECTED * f.abs()
                     + U * 200.0 * t.abs() * f.abs();
             }
-            sum[c].value += value.max(0.0);
-            sum[c].error += error;
+            sum.value += value.max(0.0);
+            sum.error += error;
         }
     }
 

@@ -24,8 +24,7 @@ impl Twin<'_> {
         let (most, limit) = (f64::from(MOST_RATIO), f64::from(self.stencil.limit[i]));
         let exponents = f64::from(MOST_EXPONENT);
         let mut out = ([Bounded::default(); 3], [(DVec3::ZERO, 0.0); 3]);
-        for c in 0..3 {
-            let own = values[i][c];
+        for (c, own) in values[i].iter().copied().enumerate() {
             if own.value <= 0.0 {
                 out.0[c] = own;
                 continue;
