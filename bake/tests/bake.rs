@@ -187,6 +187,21 @@ fn extremes_bake_or_say_why() {
     }
 }
 
+/// Thinner than a cell of the distance grid, no node of which lies inside: needles and sheets bake none the less.
+#[test]
+fn thin_objects_bake() {
+    for stretch in [DVec3::new(1.0, 0.005, 0.005), DVec3::new(1.0, 1.0, 0.003)] {
+        let mut raw = icosphere(1.0, 2);
+        raw.positions.iter_mut().for_each(|p| *p *= stretch);
+        let mesh = Mesh::from_triangles(raw.positions, raw.triangles).unwrap();
+        let params = Params { samples: 300, certificate: true, ..small() };
+        let asset = run(&mesh, &medium(8.0, 1.0, Density::Uniform(1.0)), &params).unwrap();
+        assert!((200..400).contains(&asset.samples.len()), "{stretch}: {}", asset.samples.len());
+        let certificate = asset.info.certificate.unwrap();
+        assert!(format!("{certificate:?}").find("NaN").is_none(), "{stretch}: {certificate:?}");
+    }
+}
+
 struct StopAtOnce;
 
 impl Progress for StopAtOnce {

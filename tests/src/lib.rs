@@ -14,4 +14,5 @@ pub mod reference;
 pub mod report;
 pub mod rivals;
 pub mod speed;
+pub mod stress;
 pub mod sweep;

@@ -33,6 +33,8 @@ enum Command {
     Range(commands::range::Arguments),
     /// Measure run time against error, beside other methods
     Sweep(Box<commands::sweep::Arguments>),
+    /// Check meshes, media, lights and views at the ends of what numbers can hold
+    Stress(commands::stress::Arguments),
     /// Measure how fast bakes are, as ratios within one run
     BakeSpeed(commands::bake_speed::Arguments),
     /// Measure how the time of a bake grows with samples, triangles and directions
@@ -59,6 +61,7 @@ fn main() -> ExitCode {
         Command::Demo(a) => commands::demo::run(&a),
         Command::Range(a) => commands::range::run(&a),
         Command::Sweep(a) => commands::sweep::run(&a),
+        Command::Stress(a) => commands::stress::run(&a),
         Command::BakeSpeed(a) => commands::bake_speed::run(&a),
         Command::BakeScaling(a) => commands::bake_scaling::run(&a),
     };

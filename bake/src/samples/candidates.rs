@@ -55,6 +55,9 @@ pub(crate) fn offer(
     stage: Stage<'_>,
 ) -> Result<Offered> {
     let Ground { grid, layers, fluence } = ground;
+    if layers.is_empty() && params.placement == Placement::Boundary {
+        return thin(shape, grid, medium, params);
+    }
     let patches = patches(layers, fluence, medium);
     let mean = reference_demand(&patches);
     let relative_radius = |demand: f64| (demand / mean).max(1e-12).powf(-RADIUS_EXPONENT).clamp(0.5, 2.0);
@@ -124,6 +127,35 @@ pub(crate) fn offer(
     let (surface, _) = usable(shape, grid, medium, &surface)?;
     list.extend(fill);
     Ok(Offered { surface, list, snap: BOUNDARY_SNAP, dark, untested })
+}
+
+/// Candidates of an object so thin that no node of the distance grid lies inside and there are no layers: on the mesh
+/// itself, evenly, and lit as if nothing were in the way. The bake leaves out later what is dark.
+fn thin(shape: &Shape<'_>, grid: &DistanceGrid, medium: &Medium, params: &Params) -> Result<Offered> {
+    let mesh = shape.mesh;
+    let mut cumulative = Vec::with_capacity(mesh.triangles.len());
+    let mut total = 0.0;
+    for t in 0..mesh.triangles.len() {
+        total += mesh.area_normal(t).length();
+        cumulative.push(total);
+    }
+    let count = OVERSAMPLING * params.samples + 64;
+    let one = |i: usize| {
+        let mut rng = Pcg64Mcg::seed_from_u64(hash(hash(params.seed, 43), i as u64));
+        let mass = (i as f64 + rng.random::<f64>()) / count as f64 * total;
+        let t = cumulative.partition_point(|c| *c <= mass).min(cumulative.len() - 1);
+        let bary = barycentric(rng.random(), rng.random());
+        let p: DVec3 = bary.into_iter().zip(mesh.corners(t)).map(|(b, corner)| corner * b).sum();
+        let inward = -mesh.area_normal(t).normalize_or_zero();
+        Candidate { position: p + inward * (1e-5 * shape.diagonal), radius: 1.0, fluence: 1.0 }
+    };
+    let drawn: Vec<Candidate> = (0..count).into_par_iter().map(one).collect();
+    let (mut list, untested) = usable(shape, grid, medium, &drawn)?;
+    if list.is_empty() {
+        return Err(no_room());
+    }
+    list.shuffle(&mut Pcg64Mcg::seed_from_u64(hash(params.seed, 29)));
+    Ok(Offered { surface: list.clone(), dark: drawn.len() - list.len(), list, snap: BOUNDARY_SNAP, untested })
 }
 
 /// Candidates on the boundary: on the first layer in proportion to 1/radius², moved onto the mesh.
@@ -198,7 +230,10 @@ fn reference_demand(patches: &[Patch]) -> f64 {
 }
 
 fn no_room() -> Error {
-    Error::NoRoom("no light reaches its inside, or nothing there scatters".to_owned())
+    Error::NoRoom(
+        "no light reaches its inside, or nothing there scatters; a lower extinction or a larger density there may help"
+            .to_owned(),
+    )
 }
 
 fn barycentric(u: f64, v: f64) -> [f64; 3] {

@@ -18,6 +18,7 @@ use crate::frame::{Frame, FrameLight, LightKind};
 use diaphane_formats::asset::{Info, Samples};
 use diaphane_formats::encoding::Encoding;
 use diaphane_formats::harmonics::Coefficients;
+use diaphane_formats::phase::henyey_greenstein_f32;
 use diaphane_formats::sh::{self, MAX_ORDER, coefficient_count};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -100,6 +101,7 @@ impl Lighting {
             let linear = self.linear(linear::BANDS);
             (linear, Ambient::new(lights, self.g, frame.view.origin, linear.bands))
         });
+        let most = Vec3::splat(frame.most_source());
         (0..samples.len())
             .into_par_iter()
             .with_min_len(256)
@@ -108,7 +110,7 @@ impl Lighting {
                 if let Some((linear, ambient)) = &folded {
                     value += self.albedo * from_folded(linear, ambient, i, frame.view.origin, samples);
                 }
-                value
+                value.min(most)
             })
             .collect()
     }
@@ -183,7 +185,8 @@ impl Lighting {
                     self.arriving(i, to, basis)
                 }
             };
-            sum += irradiance * arriving * henyey_greenstein(self.g, -to.dot(towards_camera));
+            let g = self.g.clamp(-prepared.light.most_cosine, prepared.light.most_cosine);
+            sum += irradiance * arriving * henyey_greenstein_f32(g, -to, towards_camera).0;
         }
         sum * self.albedo
     }
@@ -217,12 +220,6 @@ fn from_folded(linear: &Linear, ambient: &Ambient, i: usize, origin: Vec3, sampl
         sum += through * ambient.at(deviation, k);
     }
     sum.max(Vec3::ZERO)
-}
-
-/// Henyey-Greenstein's function in single precision, the formula of [`diaphane_formats::phase`].
-fn henyey_greenstein(g: f32, cosine: f32) -> f32 {
-    let base = ((1.0 - g) * (1.0 - g) + 2.0 * g * (1.0 - cosine)).max(1e-12);
-    (1.0 - g * g) / (4.0 * std::f32::consts::PI * base * base.sqrt())
 }
 
 /// Over the length of `a`; four running sums keep the additions independent of each other.

@@ -2,6 +2,7 @@
 
 use super::parallax;
 use crate::frame::FrameLight;
+use diaphane_formats::phase::henyey_greenstein_f32;
 use diaphane_formats::sh;
 use glam::Vec3;
 
@@ -26,7 +27,8 @@ impl Ambient {
         for light in lights {
             let to = -light.direction;
             sh::evaluate(bands, to.as_dvec3().to_array(), &mut basis);
-            let (phase, slope) = henyey_greenstein(g, -to.dot(towards_camera));
+            let own = g.clamp(-light.most_cosine, light.most_cosine);
+            let (phase, slope) = henyey_greenstein(own, -to, towards_camera);
             for v in 0..vectors {
                 let factor = if v == 0 { phase } else { -slope * to[v - 1] };
                 let colour = (light.colour * factor).as_dvec3().to_array();
@@ -58,9 +60,8 @@ impl Ambient {
 }
 
 /// Henyey-Greenstein's function and its derivative by the cosine, 1/sr.
-fn henyey_greenstein(g: f32, cosine: f32) -> (f32, f32) {
-    let base = ((1.0 - g) * (1.0 - g) + 2.0 * g * (1.0 - cosine)).max(1e-12);
-    let value = (1.0 - g * g) / (4.0 * std::f32::consts::PI * base * base.sqrt());
+fn henyey_greenstein(g: f32, travels: Vec3, towards: Vec3) -> (f32, f32) {
+    let (value, base) = henyey_greenstein_f32(g, travels, towards);
     (value, 3.0 * g * value / base)
 }
 
@@ -72,12 +73,17 @@ mod tests {
     fn derivative_is_that_of_the_function() {
         for g in [-0.5, 0.3, 0.8] {
             for cosine in [-0.9, 0.1, 0.7] {
-                let (_, slope) = henyey_greenstein(g, cosine);
+                let at = |cosine: f32| {
+                    let travels = Vec3::new((1.0 - cosine * cosine).sqrt(), 0.0, cosine);
+                    henyey_greenstein(g, travels, Vec3::Z)
+                };
+                let (_, slope) = at(cosine);
                 let h = 1e-3;
-                let (up, down) = (henyey_greenstein(g, cosine + h).0, henyey_greenstein(g, cosine - h).0);
+                let (up, down) = (at(cosine + h).0, at(cosine - h).0);
                 assert!((slope - (up - down) / (2.0 * h)).abs() < 2e-2 * slope.abs(), "{g} {cosine}");
             }
         }
-        assert_eq!(henyey_greenstein(0.0, 0.3), (0.25 * std::f32::consts::FRAC_1_PI, 0.0));
+        let (isotropic, slope) = henyey_greenstein(0.0, Vec3::X, Vec3::Y);
+        assert!((isotropic - 0.25 * std::f32::consts::FRAC_1_PI).abs() < 1e-8 && slope == 0.0);
     }
 }

@@ -174,6 +174,7 @@ mod tests {
             colour: Vec3::splat(colour),
             cos_inner: 0.99,
             cos_outer: 0.98,
+            most_cosine: 1.0,
         }
     }
 

@@ -171,7 +171,8 @@ pub(super) struct LightRecord {
     pub colour: Vec3,
     pub cos_outer: f32,
     pub table: u32,
-    pub unused: [u32; 3],
+    pub most_cosine: f32,
+    pub unused: [u32; 2],
 }
 
 impl LightRecord {
@@ -185,7 +186,8 @@ impl LightRecord {
             colour: light.colour,
             cos_outer: light.cos_outer,
             table: table.unwrap_or(u32::MAX),
-            unused: [0; 3],
+            most_cosine: light.most_cosine,
+            unused: [0; 2],
         }
     }
 }
@@ -285,7 +287,8 @@ mod tests {
             cos_inner,
             colour,
             cos_outer,
-            table
+            table,
+            most_cosine
         );
     }
 }

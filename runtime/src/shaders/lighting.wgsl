@@ -171,8 +171,9 @@ fn light_samples(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgrou
                 psi *= clamp(value.y, 0.0, 1.0);
             }
         }
-        let phase = henyey_greenstein(medium.mean_cosine, -dot(arriving.towards, towards_camera));
+        let g = clamp(medium.mean_cosine, -light.most_cosine, light.most_cosine);
+        let phase = henyey_greenstein(g, -arriving.towards, towards_camera);
         sum += arriving.irradiance * psi * phase;
     }
-    values[sample] = vec4f(medium.albedo * sum, weight);
+    values[sample] = vec4f(min(medium.albedo * sum, vec3f(most_source())), weight);
 }

@@ -9,6 +9,7 @@ pub mod output;
 pub mod progress;
 pub mod range;
 pub mod reference;
+pub mod stress;
 pub mod sweep;
 
 use anyhow::Context;

@@ -7,9 +7,17 @@ struct Light {
     colour: vec3f,
     cos_outer: f32,
     table: u32,             // which exact depth table replaces the spherical harmonics; NO_TABLE: none
+    most_cosine: f32,       // limit of the phase function's mean cosine, up and down
 }
 
 const NO_TABLE: u32 = 0xffffffffu;
+
+// Twins of `frame::MOST_IRRADIANCE` and `Frame::most_source`.
+const MOST_IRRADIANCE: f32 = 1e30;
+
+fn most_source() -> f32 {
+    return 1e33 / max(1000.0 * view.least_distance, 1.0);
+}
 
 struct Incident {
     towards: vec3f,         // unit, from the point to the light
@@ -17,8 +25,9 @@ struct Incident {
 }
 
 fn incident(light: Light, x: vec3f) -> Incident {
+    let most = vec3f(MOST_IRRADIANCE);
     if (light.kind == 1u) {
-        return Incident(-light.direction, light.colour);
+        return Incident(-light.direction, clamp(light.colour, -most, most));
     }
     let d = light.position - x;
     let distance = length(d);
@@ -27,7 +36,9 @@ fn incident(light: Light, x: vec3f) -> Incident {
         to = d / distance;
     }
     let clamped = max(distance, view.least_distance);
-    var irradiance = light.colour / (clamped * clamped);
+    // In two steps: the quotient must not leave single precision before it is limited.
+    let reach = MOST_IRRADIANCE * min(clamped * clamped, 1e8);
+    var irradiance = clamp(light.colour, vec3f(-reach), vec3f(reach)) / (clamped * clamped);
     if (light.kind == 2u) {
         irradiance *= cone(light.cos_outer, light.cos_inner, -dot(to, light.direction));
     }
