@@ -84,12 +84,21 @@ pub fn bake(input: &Input<'_>, params: &Params, progress: &dyn Progress) -> Resu
     memory::required(input, params)?;
     let cache = Cache::open(params.cache.as_deref())?;
     let timed = Timed::new(progress);
+    let asked = params.visibility;
     let mut params = field::suited(input, params);
     let mut goal = Goal::default();
     loop {
         let baked = Pipeline::new(input, &params, &cache, &timed).run()?;
         match goal.next(&params, baked.0.info.certificate.as_ref())? {
-            None => return Ok(baked),
+            None => {
+                let (asset, mut report) = baked;
+                if params.visibility != asked {
+                    report
+                        .warnings
+                        .push("shells overlap: depths are traced, which counts the medium once".to_owned());
+                }
+                return Ok((asset, report));
+            }
             Some(next) => params = next,
         }
         memory::required(input, &params)?;

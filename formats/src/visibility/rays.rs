@@ -4,6 +4,7 @@ use super::{Accel, Crossing};
 use crate::fresnel;
 use crate::medium::Medium;
 use glam::DVec3;
+use std::cmp::Ordering;
 
 /// What lies between a point and the light.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -19,13 +20,12 @@ pub struct Depth {
 /// Leaves only the crossings at which the inside begins or ends, so that the medium counts once where shells overlap.
 /// `crossings` are all of a ray's; they stay as they are, in their order, where none overlap.
 pub(super) fn count_once(crossings: &mut Vec<Crossing>) {
-    let mut winding: i32 = crossings.iter().map(|c| c.sign).sum();
-    if crossings.len() < 2 || (crossings.len() == 2 && winding == 0) {
+    if !may_overlap(crossings) {
         return;
     }
+    let mut winding: i32 = crossings.iter().map(|c| c.sign).sum();
     let mut sorted = crossings.clone();
-    // Exits before entries at equal distance: touching shells do not overlap.
-    sorted.sort_unstable_by(|a, b| a.t.total_cmp(&b.t).then(b.sign.cmp(&a.sign)));
+    sorted.sort_unstable_by(nearer);
     sorted.retain(|c| {
         let before = winding > 0;
         winding -= c.sign;
@@ -34,6 +34,23 @@ pub(super) fn count_once(crossings: &mut Vec<Crossing>) {
     if sorted.len() < crossings.len() {
         *crossings = sorted;
     }
+}
+
+/// The order along a ray, exits before entries at equal distance: touching shells do not overlap.
+fn nearer(a: &Crossing, b: &Crossing) -> Ordering {
+    a.t.total_cmp(&b.t).then(b.sign.cmp(&a.sign))
+}
+
+/// Whether some crossing neither begins nor ends the inside. Rays have few crossings, so that looking at all pairs takes a
+/// fraction of sorting a copy; of many it says yes unseen.
+fn may_overlap(crossings: &[Crossing]) -> bool {
+    const FEW: usize = 16;
+    crossings.len() > FEW
+        || crossings.iter().enumerate().any(|(i, c)| {
+            let behind = |(j, o): &(usize, &Crossing)| nearer(c, o).then(i.cmp(j)) == Ordering::Less;
+            let beyond: i32 = crossings.iter().enumerate().filter(behind).map(|(_, o)| o.sign).sum();
+            (beyond + c.sign > 0) == (beyond > 0)
+        })
 }
 
 /// Depth of `origin` along the unit vector `direction` up to distance `limit` (infinity for a distant light), by the
@@ -129,6 +146,7 @@ mod tests {
         // From within two shells to the outer one's end; through two that overlap; through one and then within another.
         assert_eq!(once(&[(2.0, 1), (1.0, 1)]), [(2.0, 1)]);
         assert_eq!(once(&[(1.0, -1), (3.0, 1), (2.0, -1), (4.0, 1)]), [(1.0, -1), (4.0, 1)]);
+        assert_eq!(once(&[(1.0, 1), (1.0, 1)]), [(1.0, 1)]);
         assert_eq!(
             once(&[(1.0, 1), (2.0, -1), (3.0, -1), (4.0, 1), (5.0, 1)]),
             [(1.0, 1), (2.0, -1), (5.0, 1)]
