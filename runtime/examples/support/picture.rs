@@ -2,16 +2,16 @@
 
 use anyhow::Result;
 use diaphane_formats::picture::{Display, Picture, write_png};
-use diaphane_runtime::gpu::read_texture;
+use diaphane_runtime::gpu::{Renderer, read_texture};
 use diaphane_runtime::wgpu;
 use half::f16;
 use std::path::Path;
 
-/// Any adapter's device; lanes of a subgroup that can talk make splatting faster.
+/// Any adapter's device, with the features that make splatting faster.
 pub fn device() -> Result<(wgpu::Device, wgpu::Queue)> {
     let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
     let adapter = pollster::block_on(instance.request_adapter(&Default::default()))?;
-    let required_features = adapter.features() & wgpu::Features::SUBGROUP;
+    let required_features = adapter.features() & Renderer::FEATURES;
     let descriptor = wgpu::DeviceDescriptor { required_features, ..Default::default() };
     Ok(pollster::block_on(adapter.request_device(&descriptor))?)
 }

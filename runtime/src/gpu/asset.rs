@@ -1,11 +1,14 @@
 //! Buffers that stay as long as an asset does.
 
 use super::bindings::{empty_buffer, filled_buffer};
+use super::corners::Corners;
 use super::neighbours::neighbours;
 use super::packed;
+use super::pipeline::SplatPath;
 use super::targets::PixelState;
 use super::uniforms::MediumUniform;
 use crate::cpu::surface::corner_normals;
+use crate::rendered::MAX_PIECES;
 use crate::usable::{density_at, usable_samples};
 use crate::{Error, Result};
 use diaphane_formats::asset::{Asset, Info, Samples};
@@ -14,7 +17,7 @@ use diaphane_formats::slopes::{NEIGHBOURS, Stencil};
 use diaphane_formats::{kernel, sh};
 use glam::Vec3;
 use std::sync::Arc;
-use wgpu::{Buffer, BufferUsages, Device, Queue};
+use wgpu::{BindingResource, Buffer, BufferBinding, BufferSize, BufferUsages, Device, Queue};
 
 /// Everything that stays as long as the asset does.
 #[derive(Clone)]
@@ -24,6 +27,9 @@ pub(super) struct AssetBuffers {
     pub material: MediumUniform,
     pub positions: Buffer,
     pub triangles: Buffer,
+    /// Positions of the vertices that are drawn, and three of them for every triangle; see [`Corners`].
+    pub corners: Buffer,
+    pub indices: Buffer,
     pub neighbours: Buffer,
     pub normals: Buffer,
     /// Kernels, then a sphere around every [`CLUSTER`] of them that follow each other; radius 0 without any.
@@ -45,6 +51,10 @@ pub(super) struct AssetBuffers {
     pub values: Buffer,
     /// Written by the slopes pass.
     pub sources: Buffer,
+    /// Written by the outlines pass, and by the next instance's.
+    pub outlines: Buffer,
+    /// Whether a sample may meet each piece.
+    pub shown: Buffer,
     /// As they are played.
     pub info: Info,
     /// Kept for the transmittance of folded lights.
@@ -69,7 +79,7 @@ impl AssetBuffers {
     ///
     /// # Errors
     /// An asset that makes no sense, or one that is too large for the adapter's buffers.
-    pub fn new(device: &Device, asset: &Asset) -> Result<Self> {
+    pub fn new(device: &Device, asset: &Asset, path: SplatPath) -> Result<Self> {
         asset.validate()?;
         let (samples, info) = (usable_samples(asset), &asset.info);
         let fresnel = info.ior != 1.0;
@@ -113,10 +123,17 @@ impl AssetBuffers {
         if asset.mesh_triangles.len() > (u32::MAX / 3) as usize {
             return Err(Error::Gpu("the mesh has too many triangles".to_owned()));
         }
+        let corners = Corners::new(&asset.mesh_triangles, asset.mesh_positions.len());
+        let drawn: Vec<[f32; 3]> =
+            corners.vertices.iter().map(|v| asset.mesh_positions[*v as usize]).collect();
+        // Only quads need them.
+        let outlined = if path == SplatPath::Quads { kernels.len() as u64 } else { 0 };
         let storage = BufferUsages::STORAGE;
         Ok(Self {
             positions: filled_buffer(device, "positions", &asset.mesh_positions, storage),
             triangles: filled_buffer(device, "triangles", &asset.mesh_triangles, storage),
+            corners: filled_buffer(device, "corners", &drawn, BufferUsages::VERTEX),
+            indices: filled_buffer(device, "indices", &corners.indices, BufferUsages::INDEX),
             neighbours: filled_buffer(device, "neighbours", &neighbours(&asset.mesh_triangles), storage),
             normals: filled_buffer(device, "normals", normals.as_flattened(), storage),
             samples: filled_buffer(
@@ -136,6 +153,8 @@ impl AssetBuffers {
             spokes: filled_buffer(device, "spokes", &spokes, storage),
             values: empty_buffer(device, "values", 16 * kernels.len() as u64, storage),
             sources: empty_buffer(device, "sources", 64 * kernels.len() as u64, storage),
+            outlines: empty_buffer(device, "outlines", OUTLINE * outlined, storage),
+            shown: empty_buffer(device, "shown", MAX_PIECES as u64 * shown_stride(outlined), storage),
             info: info.clone(),
             most_density: if grid.is_empty() {
                 1.0
@@ -183,6 +202,13 @@ impl AssetBuffers {
         self.medium = filled_buffer(device, "medium", &[self.material], usage);
     }
 
+    /// Which samples may meet piece `k`.
+    pub fn shown(&self, k: usize) -> BindingResource<'_> {
+        let part = self.shown.size() / MAX_PIECES as u64;
+        let (offset, size) = (k as u64 * part, BufferSize::new(part));
+        BindingResource::Buffer(BufferBinding { buffer: &self.shown, offset, size })
+    }
+
     /// What it keeps for a pixel.
     pub fn pixel_state(&self) -> PixelState {
         PixelState { fresnel: self.fresnel, heterogeneous: self.heterogeneous }
@@ -225,6 +251,14 @@ impl Variant {
             ("HETEROGENEOUS", number(self.heterogeneous)),
         ]
     }
+}
+
+/// Bytes of a sample's outline.
+const OUTLINE: u64 = 24;
+
+/// Bytes that tell of each of so many samples whether it is shown, such that a binding may begin behind them.
+fn shown_stride(samples: u64) -> u64 {
+    (4 * samples).next_multiple_of(256).max(256)
 }
 
 /// Samples of a cluster.

@@ -1,5 +1,6 @@
 //! Finding an adapter that can draw measured pictures, and catching what the driver complains about.
 
+use super::host::Renderer;
 use crate::{Error, Result};
 use std::sync::{Arc, Mutex, PoisonError};
 use wgpu::{
@@ -33,9 +34,8 @@ impl Faults {
     }
 }
 
-/// What is used where an adapter has it: splatting by quads, times of passes, lanes that talk.
-const WANTED: Features =
-    Features::FLOAT32_BLENDABLE.union(Features::TIMESTAMP_QUERY).union(Features::SUBGROUP);
+/// What is used where an adapter has it; times of passes too.
+const WANTED: Features = Renderer::FEATURES.union(Features::TIMESTAMP_QUERY);
 
 /// What a full adapter has and the simplest do not.
 const NEEDED_FLAGS: DownlevelFlags = DownlevelFlags::COMPUTE_SHADERS

@@ -27,8 +27,8 @@ use diaphane_formats::asset::{Asset, Info};
 use diaphane_formats::scene::{Light, Surface};
 use glam::Mat4;
 use wgpu::{
-    BindGroup, Buffer, BufferUsages, Color, CommandEncoder, Device, LoadOp, Operations, Queue, RenderPass,
-    RenderPassColorAttachment, RenderPassDescriptor, StoreOp, TextureFormat, TextureView,
+    BindGroup, Buffer, BufferUsages, Color, CommandEncoder, Device, Features, LoadOp, Operations, Queue,
+    RenderPass, RenderPassColorAttachment, RenderPassDescriptor, StoreOp, TextureFormat, TextureView,
 };
 
 /// The targets of a host's render pass.
@@ -134,7 +134,7 @@ struct Seen {
     exposure: f32,
 }
 
-/// Draws assets with a device that somebody else owns. No feature is needed; `SUBGROUP` makes it faster.
+/// Draws assets with a device that somebody else owns. No feature is needed; [`Self::FEATURES`] make it faster.
 pub struct Renderer {
     overlay: Overlay,
     compose: Compose,
@@ -160,6 +160,10 @@ struct Visible {
 }
 
 impl Renderer {
+    /// What a host may ask its adapter for, as far as it has it: lanes that talk, which make tiles faster, and blending of 32-bit
+    /// floats, which software adapters draw faster with.
+    pub const FEATURES: Features = Features::SUBGROUP.union(Features::FLOAT32_BLENDABLE);
+
     /// Compiles what all objects share.
     ///
     /// # Errors

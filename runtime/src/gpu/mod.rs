@@ -4,7 +4,7 @@
 //! lighting                     once a frame: samples × lights -> source of every sample
 //! surface [boundary] segments  each sub-pixel ray: mesh -> sorted crossings -> up to four inside pieces
 //! [profile] gather             each piece: kernels along it, summed and normalised, tile by tile -> picture
-//!           or splat resolve   the same by blended quads ([`SplatPath`])
+//!           or splat resolve   the same by blended quads ([`SplatPath`]), whose outlines are found once a ray
 //! ```
 //!
 //! [`GpuRenderer`] owns its device and reads pictures back; [`PictureRenderer`] records the same passes into a command buffer,
@@ -15,6 +15,7 @@
 
 mod asset;
 mod bindings;
+mod corners;
 mod device;
 mod frame;
 mod headless;

@@ -8,6 +8,7 @@ pub(super) mod fold;
 pub(super) mod gather;
 pub(super) mod lighting;
 pub(super) mod limits;
+pub(super) mod outlines;
 pub(super) mod overlay;
 pub(super) mod profile;
 pub(super) mod publish;

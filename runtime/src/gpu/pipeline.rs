@@ -8,6 +8,7 @@ use super::passes::clip::Clip;
 use super::passes::fold::Fold;
 use super::passes::gather::Gather;
 use super::passes::lighting::Lighting;
+use super::passes::outlines::Outlines;
 use super::passes::profile::Profile;
 use super::passes::resolve::Resolve;
 use super::passes::segments::Segments;
@@ -92,7 +93,7 @@ impl SplatPath {
 /// The passes of a [`SplatPath`].
 #[derive(Clone)]
 enum Splatting {
-    Quads(Splat, Resolve),
+    Quads(Outlines, Splat, Resolve),
     Tiles(Gather),
 }
 
@@ -104,6 +105,7 @@ struct Groups {
     surface: BindGroup,
     boundary: Option<BindGroup>,
     segments: BindGroup,
+    outlines: Option<BindGroup>,
     pieces: Vec<PieceGroups>,
 }
 
@@ -125,7 +127,7 @@ impl Pipeline {
     pub fn new(device: &Device, asset: &Asset, path: SplatPath) -> Result<Self> {
         let path = path.checked(device)?;
         let common = common_layout(device);
-        let asset = AssetBuffers::new(device, asset)?;
+        let asset = AssetBuffers::new(device, asset, path)?;
         Ok(Self {
             lighting: Lighting::new(device, &common, &asset),
             fold: Fold::new(device, &common),
@@ -136,6 +138,7 @@ impl Pipeline {
             profile: asset.heterogeneous.then(|| Profile::new(device, &common)),
             splatting: match path {
                 SplatPath::Quads => Splatting::Quads(
+                    Outlines::new(device, &common),
                     Splat::new(device, &common, &asset),
                     Resolve::new(device, &common, &asset),
                 ),
@@ -171,7 +174,7 @@ impl Pipeline {
     fn renew_variant(&mut self, device: &Device) {
         let variant = self.asset.variant();
         match &mut self.splatting {
-            Splatting::Quads(splat, _) => splat.set_variant(device, variant),
+            Splatting::Quads(_, splat, _) => splat.set_variant(device, variant),
             Splatting::Tiles(gather) => gather.set_variant(device, variant),
         }
     }
@@ -236,7 +239,7 @@ impl Pipeline {
     /// # Errors
     /// As [`Self::new`].
     pub(super) fn level(&self, device: &Device, asset: &Asset) -> Result<Self> {
-        let mut level = self.with(device, AssetBuffers::new(device, asset)?);
+        let mut level = self.with(device, AssetBuffers::new(device, asset, self.path())?);
         level.renew_variant(device);
         Ok(level)
     }
@@ -376,12 +379,15 @@ impl Pipeline {
         if let Some((clip, group)) = clip {
             clip.record(r, group);
         }
+        if let (Splatting::Quads(outlines, ..), Some(group)) = (&self.splatting, &groups.outlines) {
+            outlines.record(r, group, &self.asset);
+        }
         for (k, piece) in groups.pieces.iter().enumerate() {
             if let (Some(profile), Some(group)) = (&self.profile, &piece.profile) {
                 profile.record(r, group, targets, k);
             }
             match (&self.splatting, &piece.splatting) {
-                (Splatting::Quads(quads, end), SplattingGroups::Quads { splat, resolve }) => {
+                (Splatting::Quads(_, quads, end), SplattingGroups::Quads { splat, resolve }) => {
                     quads.record(r, splat, targets, k);
                     end.record(r, resolve, targets, k);
                 }
@@ -398,7 +404,7 @@ impl Pipeline {
         let piece = |k: usize| PieceGroups {
             profile: self.profile.as_ref().map(|p| p.bind(device, asset, targets, k)),
             splatting: match &self.splatting {
-                Splatting::Quads(splat, resolve) => SplattingGroups::Quads {
+                Splatting::Quads(_, splat, resolve) => SplattingGroups::Quads {
                     splat: splat.bind(device, asset, targets, k),
                     resolve: resolve.bind(device, targets, k),
                 },
@@ -412,6 +418,10 @@ impl Pipeline {
             surface: self.surface.bind(device, asset, targets),
             boundary: self.boundary.as_ref().map(|b| b.bind(device, asset, frame, targets)),
             segments: self.segments.bind(device, targets),
+            outlines: match &self.splatting {
+                Splatting::Quads(outlines, ..) => Some(outlines.bind(device, asset, targets)),
+                Splatting::Tiles(_) => None,
+            },
             pieces: (0..MAX_PIECES).map(piece).collect(),
         }
     }

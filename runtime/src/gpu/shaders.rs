@@ -15,6 +15,7 @@ pub(super) const LIGHTING: &str =
     source!("shared/view", "shared/medium", "shared/light", "shared/phase", "shared/sh", "lighting");
 pub(super) const FOLD: &str = source!("shared/view", "shared/medium", "fold");
 pub(super) const SLOPES: &str = source!("shared/view", "shared/medium", "slopes");
+pub(super) const OUTLINES: &str = source!("shared/view", "shared/medium", "shared/kernel", "outlines");
 pub(super) const SPLAT: &str = source!(
     "shared/view",
     "shared/medium",

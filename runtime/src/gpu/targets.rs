@@ -14,11 +14,11 @@ use wgpu::{
 pub(super) const SUM_FORMAT: TextureFormat = TextureFormat::Rgba32Float;
 /// Format of the attachment that the surface pass does not write.
 pub(super) const MARKER_FORMAT: TextureFormat = TextureFormat::R8Unorm;
-/// Bytes of one piece's indirect arguments: a draw (four words), a dispatch over cells of 8 × 8 pixels (three, one unused), one
-/// over the listed tiles of 16 × 16.
+/// Bytes of one piece's indirect arguments: an indexed draw (five words), a dispatch over cells of 8 × 8 pixels (three), one over
+/// the listed tiles of 16 × 16 (three, one unused).
 pub(super) const ARGUMENTS: u64 = 48;
 /// Where the dispatches are in them.
-pub(super) const OVER_CELLS: u64 = 16;
+pub(super) const OVER_CELLS: u64 = 20;
 pub(super) const OVER_TILES: u64 = 32;
 
 /// State of all pixels together stays below this, so that large pictures leave memory to others.
@@ -54,8 +54,7 @@ pub(super) struct Targets {
     pub arguments: Buffer,
     /// Tiles, padded as `stride`.
     tile_stride: u64,
-    /// Cells of 8 × 8 pixels, padded as `stride`.
-    cell_stride: u64,
+    /// Least start and greatest end of each piece in cells of 8 × 8 pixels.
     pub cells: Buffer,
     pub marker: TextureView,
     pub numerator: TextureView,
@@ -141,7 +140,6 @@ impl Targets {
             ),
             tile_stride,
             cells: buffer("cells", CELL * MAX_PIECES as u64 * cell_stride, state),
-            cell_stride,
             marker: texture("marker", MARKER_FORMAT, tile.size),
             numerator: texture("numerator", SUM_FORMAT, blended),
             denominator: texture("denominator", SUM_FORMAT, blended),
@@ -154,15 +152,6 @@ impl Targets {
             buffer: &self.pieces,
             offset: k as u64 * self.stride * PIECE,
             size: wgpu::BufferSize::new(self.stride * PIECE),
-        })
-    }
-
-    /// Ranges of piece `k` in every cell.
-    pub fn piece_cells(&self, k: usize) -> wgpu::BindingResource<'_> {
-        wgpu::BindingResource::Buffer(BufferBinding {
-            buffer: &self.cells,
-            offset: k as u64 * self.cell_stride * CELL,
-            size: wgpu::BufferSize::new(self.cell_stride * CELL),
         })
     }
 

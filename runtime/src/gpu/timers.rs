@@ -16,6 +16,7 @@ pub(super) enum Pass {
     Boundary,
     Segments,
     Profile,
+    Outlines,
     Splat,
     Resolve,
 }
@@ -24,7 +25,7 @@ pub(super) enum Pass {
 pub(super) const PASSES: usize = Pass::ALL.len();
 
 impl Pass {
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 10] = [
         Self::Lighting,
         Self::Fold,
         Self::Slopes,
@@ -32,6 +33,7 @@ impl Pass {
         Self::Boundary,
         Self::Segments,
         Self::Profile,
+        Self::Outlines,
         Self::Splat,
         Self::Resolve,
     ];
@@ -51,6 +53,7 @@ impl Pass {
             Self::Boundary => "boundary",
             Self::Segments => "segments",
             Self::Profile => "profile",
+            Self::Outlines => "outlines",
             Self::Splat => "splat",
             Self::Resolve => "resolve",
         }

@@ -7,7 +7,9 @@ const SLOTS: u32 = 8u;
 const STATE: u32 = 10u;
 const BOUNDARY: u32 = 12u;
 const MAX_PIECES: u32 = 4u;
-const ARGUMENTS: u32 = 12u; // draw (4), dispatch over 8 x 8 pixels (3), unused, over listed tiles (3), unused
+const ARGUMENTS: u32 = 12u; // indexed draw (5), dispatch over 8 x 8 pixels (3), over listed tiles (3), unused
+const BATCH: u32 = 64u;     // samples of an instance of the draw
+const INDICES: u32 = 768u;  // of an instance: four triangles a sample
 const LISTS: u32 = 64u;     // where the lists of tiles of each piece begin; then come a mark for every tile and piece
 
 @group(1) @binding(0) var<storage, read> crossings: array<u32>;
@@ -117,11 +119,11 @@ fn cut(index: u32) {
             pieces[k * stride + index] = vec4f(0.0);
         } else if (atomicLoad(&arguments[k * ARGUMENTS]) == 0u) {
             let groups = (view.tile_size + vec2u(7u)) / 8u;
-            atomicMax(&arguments[k * ARGUMENTS + 1u], medium.samples);
-            atomicMax(&arguments[k * ARGUMENTS + 4u], groups.x);
-            atomicMax(&arguments[k * ARGUMENTS + 5u], groups.y);
-            atomicMax(&arguments[k * ARGUMENTS + 6u], 1u);
-            atomicMax(&arguments[k * ARGUMENTS], 6u);
+            atomicMax(&arguments[k * ARGUMENTS + 1u], (medium.samples + BATCH - 1u) / BATCH);
+            atomicMax(&arguments[k * ARGUMENTS + 5u], groups.x);
+            atomicMax(&arguments[k * ARGUMENTS + 6u], groups.y);
+            atomicMax(&arguments[k * ARGUMENTS + 7u], 1u);
+            atomicMax(&arguments[k * ARGUMENTS], INDICES);
         }
     }
     front[index] = vec4f(1.0, 1.0, 1.0, 0.0);

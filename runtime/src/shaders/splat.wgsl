@@ -5,12 +5,21 @@
 @group(1) @binding(1) var<storage, read> sources: array<vec4f>; // SOURCE a sample: v, weight; slopes
 @group(1) @binding(2) var<storage, read> piece: array<vec4f>;
 @group(1) @binding(3) var<storage, read> profile: array<vec4f>;
-// Least start and greatest end of the current piece over 8 x 8 pixels: kernels that no ray meets draw nothing.
-@group(1) @binding(4) var<storage, read> cells: array<vec2f>;
+@group(1) @binding(4) var<storage, read> outlines: array<Outline>;
+// Whether a sample's kernel may meet the current piece of any pixel; those that do not draw nothing.
+@group(1) @binding(5) var<storage, read> shown: array<u32>;
 
 const SOURCE: u32 = 4u;
-const CELL: u32 = 8u;
-const MOST_CELLS: u32 = 64u;
+const TRIANGLE_PIXELS: f32 = 9.0;
+const SQUARE_PIXELS: f32 = 20.0;
+const BATCH: u32 = 64u; // samples of an instance
+
+// See outlines.wgsl.
+struct Outline {
+    middle: vec2f,
+    first: vec2f,
+    second: vec2f,
+}
 
 struct Splat {
     @builtin(position) position: vec4f,
@@ -26,92 +35,38 @@ struct Sums {
     @location(1) denominator: vec4f, // w * W per channel
 }
 
-// Corners of a hexagon around the unit circle, in the order of a triangle strip.
+// Corners of shapes around the unit circle, in the order of a triangle strip. Few triangles waste few of the pixels that
+// rasterisers shade together along edges; many lie closer around the circle.
+const TRIANGLE = array<vec2f, 6>(
+    vec2f(2.0, 0.0), vec2f(-1.0, 1.7320508), vec2f(-1.0, -1.7320508),
+    vec2f(-1.0, -1.7320508), vec2f(-1.0, -1.7320508), vec2f(-1.0, -1.7320508));
+const SQUARE = array<vec2f, 6>(
+    vec2f(1.0, 1.0), vec2f(-1.0, 1.0), vec2f(1.0, -1.0), vec2f(-1.0, -1.0), vec2f(-1.0, -1.0), vec2f(-1.0, -1.0));
 const HEXAGON = array<vec2f, 6>(
     vec2f(1.1547005, 0.0), vec2f(0.57735027, 1.0), vec2f(0.57735027, -1.0),
     vec2f(-0.57735027, 1.0), vec2f(-0.57735027, -1.0), vec2f(-1.1547005, 0.0));
 
-// A kernel's sphere as the camera sees it, in coordinates along the unit axes of the picture at distance 1.
-//
-// A sphere with radius r at distance z along the view and p across it projects to an ellipse whose axes point away
-// from the picture's centre and across: with w = z * z - r * r, middle p z / w, semi-axes r sqrt(p * p + w) / w and
-// r / sqrt(w).
-struct Outline {
-    middle: vec2f,
-    away: vec2f,
-    axes: vec2f,
-}
-
-fn outline_of(centre: vec3f, radius: f32, unit: vec2f) -> Outline {
-    let z = dot(centre, view.forward);
-    if (z < 1.05 * radius) {
-        // It reaches the camera's plane and may be anywhere in the picture.
-        return Outline(vec2f(0.0), vec2f(1.0, 0.0), 4.0 * unit);
-    }
-    let across = vec2f(dot(centre, view.right), dot(centre, view.up)) / unit;
-    let p = length(across);
-    var away = vec2f(1.0, 0.0);
-    if (p > 0.0) {
-        away = across / p;
-    }
-    // An eighth of a pixel for the rounding of coordinates.
-    let margin = 0.25 * max(unit.x / f32(view.width), unit.y / f32(view.height));
-    let w = z * z - radius * radius;
-    let axes = vec2f(radius * sqrt(p * p + w) / w, radius / sqrt(w)) + margin;
-    return Outline(away * (p * z / w), away, axes);
-}
-
-// Whether the current piece of any pixel under an outline comes within `low`..`high` of the camera, as far as the
-// cells know.
-fn may_meet(outline: Outline, unit: vec2f, low: f32, high: f32) -> bool {
-    let reach = vec2f(length(outline.axes * outline.away), length(outline.axes * outline.away.yx)) / unit;
-    let middle = outline.middle / unit * vec2f(1.0, -1.0);
-    let scale = 0.5 * vec2f(f32(view.width), f32(view.height));
-    let start = vec2f(view.tile_start);
-    let size = vec2f(view.tile_size);
-    // One more pixel on each side for where rays stand in their pixels.
-    let first = max((middle - reach + 1.0) * scale - start - 1.0, vec2f(0.0));
-    let last = min((middle + reach + 1.0) * scale - start + 1.0, size - 1.0);
-    if (any(first > last)) {
-        return false;
-    }
-    let top = vec2u(first) / CELL;
-    let bottom = vec2u(last) / CELL;
-    if ((bottom.x - top.x + 1u) * (bottom.y - top.y + 1u) > MOST_CELLS) {
-        return true;
-    }
-    let columns = (view.tile_size.x + CELL - 1u) / CELL;
-    for (var y = top.y; y <= bottom.y; y++) {
-        for (var x = top.x; x <= bottom.x; x++) {
-            let range = cells[y * columns + x];
-            if (range.x < high && range.y > low) {
-                return true;
-            }
-        }
-    }
-    return false;
-}
-
+// Vertex 6 k + c is corner c of the k-th sample of its instance.
 @vertex
-fn outline(@builtin(vertex_index) corner: u32, @builtin(instance_index) index: u32) -> Splat {
-    let sample = samples[index];
-    let source = sources[SOURCE * index];
-    let centre = sample.xyz - view.origin;
-    let radius = 1.0001 * CUT_OFF_RADIUS / sample.w;
-    var position = vec4f(2.0, 2.0, 0.0, 1.0);
-    if (source.w > 0.0 && dot(centre, view.forward) > -radius) {
-        let unit = vec2f(length(view.right), length(view.up));
-        let shape = outline_of(centre, radius, unit);
-        let distance = length(centre);
-        if (may_meet(shape, unit, distance - radius, distance + radius)) {
-            let at = shape.axes * HEXAGON[corner];
-            let turned = shape.away * at.x + vec2f(-shape.away.y, shape.away.x) * at.y;
-            position = tile_clip((shape.middle + turned) / unit, 1.0);
-        }
+fn outline(@builtin(vertex_index) vertex: u32, @builtin(instance_index) batch: u32) -> Splat {
+    let index = BATCH * batch + vertex / 6u;
+    if (index >= medium.samples || shown[index] == 0u) {
+        return Splat(vec4f(2.0, 2.0, 0.0, 1.0), vec4f(0.0), vec4f(0.0), vec3f(0.0), vec3f(0.0), vec3f(0.0));
     }
+    let shape = outlines[index];
+    let pixels = length(shape.first * 0.5 * vec2f(f32(view.width), f32(view.height)));
+    let corner = vertex % 6u;
+    var at = HEXAGON[corner];
+    if (pixels < TRIANGLE_PIXELS) {
+        at = TRIANGLE[corner];
+    } else if (pixels < SQUARE_PIXELS) {
+        at = SQUARE[corner];
+    }
+    var position = tile_clip(shape.middle + shape.first * at.x + shape.second * at.y, 1.0);
     position.z = 0.0;
+    let sample = samples[index];
     let slopes = SOURCE * index + 1u;
-    return Splat(position, vec4f(centre, sample.w), source,
+    return Splat(position, vec4f(sample.xyz - view.origin, sample.w), sources[slopes - 1u],
         sources[slopes].xyz, sources[slopes + 1u].xyz, sources[slopes + 2u].xyz);
 }
 

@@ -26,13 +26,14 @@ fn corner_position(corner: u32) -> vec3f {
     return vec3f(positions[v], positions[v + 1u], positions[v + 2u]);
 }
 
+// Vertex i begins triangle i, and flat values are those of a triangle's first vertex.
 @vertex
-fn corner(@builtin(vertex_index) index: u32) -> Corner {
-    let q = corner_position(index) - view.origin;
+fn corner(@builtin(vertex_index) triangle: u32, @location(0) position: vec3f) -> Corner {
+    let q = position - view.origin;
     let plane = vec2f(
         dot(q, view.right) / dot(view.right, view.right),
         dot(q, view.up) / dot(view.up, view.up));
-    return Corner(tile_clip(plane, dot(q, view.forward)), index / 3u);
+    return Corner(tile_clip(plane, dot(q, view.forward)), triangle);
 }
 
 // x without its lower 12 bits: products of two such numbers are exact.

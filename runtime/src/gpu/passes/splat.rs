@@ -1,17 +1,21 @@
 //! The splat pass: every sample's kernel along one inside piece of every pixel.
 
 use super::super::asset::{AssetBuffers, Variant};
-use super::super::bindings::{Slot, group, layout, options, pipeline_layout};
+use super::super::bindings::{Slot, filled_buffer, group, layout, options, pipeline_layout};
 use super::super::shaders;
 use super::super::targets::{ARGUMENTS, SUM_FORMAT, Targets};
 use super::super::timers::Pass;
 use super::Recorder;
 use wgpu::{
-    BindGroup, BindGroupLayout, BlendComponent, BlendFactor, BlendOperation, BlendState, Color,
-    ColorTargetState, ColorWrites, Device, FragmentState, LoadOp, Operations, PipelineLayout, PrimitiveState,
-    PrimitiveTopology, RenderPassColorAttachment, RenderPassDescriptor, RenderPipeline,
-    RenderPipelineDescriptor, ShaderModule, ShaderStages, StoreOp, TextureView, VertexState,
+    BindGroup, BindGroupLayout, BlendComponent, BlendFactor, BlendOperation, BlendState, Buffer,
+    BufferUsages, Color, ColorTargetState, ColorWrites, Device, FragmentState, IndexFormat, LoadOp,
+    Operations, PipelineLayout, PrimitiveState, PrimitiveTopology, RenderPassColorAttachment,
+    RenderPassDescriptor, RenderPipeline, RenderPipelineDescriptor, ShaderModule, ShaderStages, StoreOp,
+    TextureView, VertexState,
 };
+
+/// Samples of an instance: a draw of few corners costs adapters as much as one of a few hundred.
+const BATCH: u16 = 64;
 
 const ADD: BlendComponent = BlendComponent {
     src_factor: BlendFactor::One,
@@ -27,16 +31,19 @@ pub(crate) struct Splat {
     module: ShaderModule,
     variant: Variant,
     pipeline: RenderPipeline,
+    /// Of the hexagons of a batch of samples.
+    indices: Buffer,
 }
 
 impl Splat {
     pub fn new(device: &Device, common: &BindGroupLayout, asset: &AssetBuffers) -> Self {
-        let layout = layout(device, "splat", ShaderStages::VERTEX_FRAGMENT, &[Slot::Read; 5]);
+        let layout = layout(device, "splat", ShaderStages::VERTEX_FRAGMENT, &[Slot::Read; 6]);
         let pipeline_layout = pipeline_layout(device, "splat", common, &layout);
         let module = shaders::module(device, "splat", shaders::SPLAT);
         let variant = asset.variant();
         let pipeline = Self::pipeline(device, &pipeline_layout, &module, variant);
-        Self { layout, pipeline_layout, module, variant, pipeline }
+        let indices = filled_buffer(device, "hexagons", &hexagons(), BufferUsages::INDEX);
+        Self { layout, pipeline_layout, module, variant, pipeline, indices }
     }
 
     /// Compiles the pass anew where another material needs other code.
@@ -68,7 +75,7 @@ impl Splat {
                 compilation_options: options(&constants),
                 buffers: &[],
             },
-            primitive: PrimitiveState { topology: PrimitiveTopology::TriangleStrip, ..Default::default() },
+            primitive: PrimitiveState { topology: PrimitiveTopology::TriangleList, ..Default::default() },
             depth_stencil: None,
             multisample: Default::default(),
             fragment: Some(FragmentState {
@@ -88,7 +95,8 @@ impl Splat {
             asset.sources.as_entire_binding(),
             targets.piece(piece),
             targets.profile.as_entire_binding(),
-            targets.piece_cells(piece),
+            asset.outlines.as_entire_binding(),
+            asset.shown(piece),
         ];
         group(device, "splat", &self.layout, resources)
     }
@@ -106,8 +114,15 @@ impl Splat {
         render.set_pipeline(&self.pipeline);
         Recorder::aim(r.common, r.view_offset, r.tile, &mut render);
         render.set_bind_group(1, group, &[]);
-        render.draw_indirect(&targets.arguments, ARGUMENTS * piece as u64);
+        render.set_index_buffer(self.indices.slice(..), IndexFormat::Uint16);
+        render.draw_indexed_indirect(&targets.arguments, ARGUMENTS * piece as u64);
     }
+}
+
+/// Corners of the four triangles of each hexagon of a batch, whose corners are numbered as those of a strip.
+fn hexagons() -> Vec<u16> {
+    let triangles = [[0, 1, 2], [2, 1, 3], [2, 3, 4], [4, 3, 5]];
+    (0..BATCH).flat_map(|k| triangles.as_flattened().iter().map(move |c| 6 * k + c)).collect()
 }
 
 fn cleared(view: &TextureView) -> Option<RenderPassColorAttachment<'_>> {

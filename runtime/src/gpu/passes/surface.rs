@@ -8,9 +8,9 @@ use super::super::timers::Pass;
 use super::Recorder;
 use wgpu::{
     BindGroup, BindGroupLayout, Color, ColorTargetState, ColorWrites, Device, FragmentState, FrontFace,
-    LoadOp, Operations, PipelineLayout, PrimitiveState, PrimitiveTopology, RenderPassColorAttachment,
-    RenderPassDescriptor, RenderPipeline, RenderPipelineDescriptor, ShaderModule, ShaderStages, StoreOp,
-    VertexState,
+    IndexFormat, LoadOp, Operations, PipelineLayout, PrimitiveState, PrimitiveTopology,
+    RenderPassColorAttachment, RenderPassDescriptor, RenderPipeline, RenderPipelineDescriptor, ShaderModule,
+    ShaderStages, StoreOp, VertexAttribute, VertexBufferLayout, VertexFormat, VertexState, VertexStepMode,
 };
 
 /// See surface.wgsl.
@@ -61,7 +61,15 @@ pub(super) fn mesh_pipeline(
             module,
             entry_point: Some("corner"),
             compilation_options: options(&[]),
-            buffers: &[],
+            buffers: &[Some(VertexBufferLayout {
+                array_stride: 12,
+                step_mode: VertexStepMode::Vertex,
+                attributes: &[VertexAttribute {
+                    format: VertexFormat::Float32x3,
+                    offset: 0,
+                    shader_location: 0,
+                }],
+            })],
         },
         primitive: PrimitiveState {
             topology: PrimitiveTopology::TriangleList,
@@ -111,5 +119,7 @@ pub(super) fn draw_mesh(
     render.set_pipeline(pipeline);
     Recorder::aim(r.common, r.view_offset, r.tile, &mut render);
     render.set_bind_group(1, group, &[]);
-    render.draw(0..3 * asset.triangle_count, 0..1);
+    render.set_vertex_buffer(0, asset.corners.slice(..));
+    render.set_index_buffer(asset.indices.slice(..), IndexFormat::Uint32);
+    render.draw_indexed(0..3 * asset.triangle_count, 0, 0..1);
 }
