@@ -16,6 +16,7 @@
 mod asset;
 mod bindings;
 mod device;
+mod faults;
 mod frame;
 mod headless;
 mod host;
@@ -32,6 +33,7 @@ mod timers;
 mod uniforms;
 
 pub use device::{GpuDevice, instance};
+pub use faults::{guarded, is_guarded, wait};
 pub use headless::GpuRenderer;
 pub use host::{AssetId, HostDepth, HostFrame, HostReport, InstanceId, Options, Renderer};
 pub use picture::{PictureRenderer, Request, Statistics};
