@@ -20,7 +20,7 @@ pub enum Error {
     #[error("{0}")]
     Host(String),
     /// The GPU went away: it was unplugged or reset, or its driver gave up. All that was made on it is gone.
-    #[error("the GPU was lost ({0}); open it again or use the CPU backend")]
+    #[error("the GPU was lost ({0}); if that happens again use the CPU backend")]
     Lost(String),
     /// The GPU has no memory for something.
     #[error(

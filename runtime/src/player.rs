@@ -219,7 +219,7 @@ impl Player {
         });
         match again {
             Ok(rendered) => {
-                self.note = Some(format!("{failure}; it was opened again and drew the frame anew"));
+                self.note = Some(format!("the GPU was opened again and drew the frame anew: {failure}"));
                 Ok(rendered)
             }
             Err(second) if self.backend == Backend::Gpu => {
@@ -229,7 +229,7 @@ impl Player {
             Err(second) => {
                 self.replace(Engine::Cpu(Box::new(CpuRenderer::new(asset)?)));
                 self.note =
-                    Some(format!("{failure}; opened again: {second}; drawing on the CPU from now on"));
+                    Some(format!("drawing on the CPU from now on: {failure}; opened again: {second}"));
                 self.render(frame, mode)
             }
         }

@@ -186,15 +186,18 @@ impl GpuRenderer {
         take: impl FnMut(Tile, TileData),
     ) -> Result<[f64; PASSES]> {
         let drawn = self.draw_tiles(frame, exact, offsets, take);
-        // What the device says comes before what follows from it.
-        let drawn = self.owned.check().and(drawn);
-        if drawn.is_err() {
-            self.renderer.forget_targets();
-            // What is on its way comes in, and what was dropped is freed.
-            let _ = wait(&self.owned.device);
-            let _ = self.owned.check();
+        let fine = self.owned.check();
+        if fine.is_ok() && drawn.is_ok() {
+            return drawn;
         }
-        drawn
+        self.renderer.forget_targets();
+        // What is on its way comes in, and what was dropped is freed.
+        let waited = wait(&self.owned.device);
+        // What the device says comes before what follows from it; its loss comes before everything.
+        match (self.owned.check(), fine) {
+            (Err(lost @ Error::Lost(_)), _) | (_, Err(lost)) | (Err(lost), Ok(())) => Err(lost),
+            (Ok(()), Ok(())) => waited.and(drawn),
+        }
     }
 
     fn draw_tiles(

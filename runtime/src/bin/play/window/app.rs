@@ -125,7 +125,7 @@ impl App {
         drop(old);
         let view =
             View::new(window, &self.session.asset).map_err(|e| anyhow!("{failure}; opened again: {e:#}"))?;
-        self.message = format!("{failure}; it was opened again");
+        self.message = format!("the GPU was opened again: {failure}");
         eprintln!("note: {}", self.message);
         view.screen.window.request_redraw();
         self.view = Some(View { place, pointer, frames, ..view });

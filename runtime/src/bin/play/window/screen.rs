@@ -145,6 +145,20 @@ impl Screen {
     /// # Errors
     /// The GPU failed.
     pub fn draw(&mut self, request: &Request) -> Result<()> {
+        let drawn = self.draw_rays(request);
+        self.first_cause(drawn)
+    }
+
+    /// What the device says comes before what follows from it.
+    fn first_cause<T>(&self, done: Result<T>) -> Result<T> {
+        if done.is_err() {
+            wait(&self.gpu.device)?;
+            self.gpu.check()?;
+        }
+        done
+    }
+
+    fn draw_rays(&mut self, request: &Request) -> Result<()> {
         let (device, queue) = (&self.gpu.device, &self.gpu.queue);
         let mut encoder = device.create_command_encoder(&Default::default());
         self.renderer.prepare(device, queue, &mut encoder, request)?;
@@ -158,6 +172,11 @@ impl Screen {
     /// # Errors
     /// The GPU failed; the surface did so again and again.
     pub fn paint(&mut self, painting: Painting) -> Result<Painted> {
+        let painted = self.paint_frame(painting);
+        self.first_cause(painted)
+    }
+
+    fn paint_frame(&mut self, painting: Painting) -> Result<Painted> {
         // The panel's renderer has no patience with a device that is gone already.
         self.gpu.check()?;
         let (device, queue) = (&self.gpu.device, &self.gpu.queue);
