@@ -234,6 +234,10 @@ pub fn run_bake(arguments: &Arguments, bars: &Bars) -> anyhow::Result<Report> {
         files::require_writable(report)?;
     }
     files::require_writable(output)?;
+    let left = files::remove_unfinished(output);
+    if left > 0 && !arguments.quiet {
+        eprintln!("note: removed {left} unfinished file(s) of earlier bakes beside '{}'", output.display());
+    }
     let medium = material::load(material_path)?;
     let (mesh, mesh_report) = mesh::load_obj(mesh_path)?;
     if !arguments.quiet {

@@ -108,10 +108,27 @@ fn killed_at_any_moment_it_leaves_the_old_file_or_the_new_one() {
         replaced += u32::from(found == new);
     }
     assert!(unchanged > 0 && replaced > 0, "{unchanged} unchanged, {replaced} replaced");
-    // What the killed ones left in the cache serves.
+    // What the killed ones left in the cache serves, and what they left beside the asset goes.
     let done = place.bake(2, &place.asset()).output().unwrap();
     assert!(done.status.success(), "{}", text(&done));
+    assert_eq!(std::fs::read_dir(place.out()).unwrap().count(), 1, "something was left behind");
     assert_eq!(std::fs::read(place.asset()).unwrap(), new);
+}
+
+#[test]
+fn unfinished_files_of_killed_bakes_are_removed_and_counted() {
+    let place = Place::new();
+    // A bake that is stopped in the middle of its writing, before it gives the file its name.
+    // The number is the CRC-32 of "a.dph".
+    let [left, other] =
+        [".diaphane-0115828d-", ".diaphane-00000000-"].map(|stem| place.out().join(format!("{stem}AbC123")));
+    std::fs::write(&left, b"half").unwrap();
+    std::fs::write(&other, b"somebody's").unwrap();
+    let done = place.bake(1, &place.asset()).output().unwrap();
+    assert!(done.status.success() && text(&done).contains("removed 1 unfinished file"), "{}", text(&done));
+    assert!(!left.exists() && other.exists());
+    let done = place.bake(1, &place.asset()).output().unwrap();
+    assert!(done.status.success() && !text(&done).contains("unfinished"), "{}", text(&done));
 }
 
 #[test]

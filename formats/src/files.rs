@@ -1,8 +1,11 @@
 //! Opening and writing files: only regular files are read, and a file appears under its name only when complete.
 
 use crate::{Error, Result};
+use std::fs::TryLockError;
 use std::io::{Read, Write};
 use std::path::Path;
+use std::time::Duration;
+use tempfile::NamedTempFile;
 
 /// Reads a whole regular file. Anything else (folder, device, pipe) is refused, so that a path from a file of a
 /// stranger cannot block or flood the program.
@@ -43,9 +46,8 @@ pub fn write_scratch(path: &Path, bytes: &[u8]) -> Result<()> {
 }
 
 fn replace(path: &Path, bytes: &[u8], flush: bool) -> Result<()> {
-    let folder = parent(path);
     let fail = |e| Error::io("write", path, e);
-    let mut file = tempfile::Builder::new().prefix(".diaphane-").tempfile_in(folder).map_err(fail)?;
+    let mut file = temporary(path).map_err(fail)?;
     file.write_all(bytes).map_err(fail)?;
     if flush {
         file.as_file().sync_all().map_err(fail)?;
@@ -60,17 +62,69 @@ fn replace(path: &Path, bytes: &[u8], flush: bool) -> Result<()> {
     Ok(())
 }
 
+/// How the names of all files begin that are to become `path`. A checksum stands for its name, which may be as long as
+/// names can be.
+fn stem(path: &Path) -> String {
+    let name = path.file_name().unwrap_or_default();
+    format!(".diaphane-{:08x}-", crc32fast::hash(name.as_encoded_bytes()))
+}
+
+/// A file beside `path` to be written and renamed. It is locked for as long as it is open, so that [`remove_unfinished`]
+/// knows that somebody is at work.
+fn temporary(path: &Path) -> std::io::Result<NamedTempFile> {
+    loop {
+        let file = tempfile::Builder::new().prefix(&stem(path)).tempfile_in(parent(path))?;
+        // Some file systems have no locks; age alone speaks for a file there.
+        let _ = file.as_file().lock();
+        // Gone only if it was taken for an abandoned one in the moment before it was locked.
+        if file.path().exists() || !parent(path).exists() {
+            return Ok(file);
+        }
+    }
+}
+
+/// Removes what writers of `path` left beside it that were killed before they were done, and says how many files that were.
+/// What is being written now is locked and stays; without locks everything stays for a day. A folder that cannot be listed
+/// holds nothing to remove.
+pub fn remove_unfinished(path: &Path) -> usize {
+    let stem = stem(path);
+    let Ok(entries) = std::fs::read_dir(parent(path)) else { return 0 };
+    let ours = |name: &std::ffi::OsStr| {
+        name.to_str()
+            .and_then(|n| n.strip_prefix(&stem))
+            .is_some_and(|rest| rest.len() == RANDOM && rest.bytes().all(|b| b.is_ascii_alphanumeric()))
+    };
+    entries.flatten().filter(|e| ours(&e.file_name()) && remove_abandoned(&e.path())).count()
+}
+
+/// Letters at the end of a temporary name.
+const RANDOM: usize = 6;
+/// After this long a file that cannot be locked counts as abandoned.
+const ABANDONED: Duration = Duration::from_secs(24 * 60 * 60);
+
+/// Removes a file that nobody writes any more; says whether it is gone.
+fn remove_abandoned(file: &Path) -> bool {
+    if !file.symlink_metadata().is_ok_and(|m| m.is_file()) {
+        return false;
+    }
+    let Ok(open) = std::fs::OpenOptions::new().write(true).open(file) else { return false };
+    let abandoned = match open.try_lock() {
+        Ok(()) => true,
+        Err(TryLockError::WouldBlock) => false,
+        Err(TryLockError::Error(_)) => {
+            open.metadata().and_then(|m| m.modified()).is_ok_and(|m| m.elapsed().is_ok_and(|e| e > ABANDONED))
+        }
+    };
+    // While the lock is held: a writer that waits for it sees that its file is gone and begins another one.
+    abandoned && std::fs::remove_file(file).is_ok()
+}
+
 /// Checks, before long work, that `path` can be written: its folder exists and takes files, and it is no folder.
 pub fn require_writable(path: &Path) -> Result<()> {
     if path.is_dir() {
         return Err(Error::file(path, "is a folder; name a file to write to"));
     }
-    let folder = parent(path);
-    tempfile::Builder::new()
-        .prefix(".diaphane-")
-        .tempfile_in(folder)
-        .map(|_| ())
-        .map_err(|e| Error::io("write", path, e))
+    temporary(path).map(|_| ()).map_err(|e| Error::io("write", path, e))
 }
 
 /// Fails when two paths name the same file, so that an output never replaces an input.
@@ -86,5 +140,79 @@ fn parent(path: &Path) -> &Path {
     match path.parent() {
         Some(p) if !p.as_os_str().is_empty() => p,
         _ => Path::new("."),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Names in a folder.
+    fn names(folder: &Path) -> Vec<String> {
+        let mut names: Vec<_> = std::fs::read_dir(folder)
+            .unwrap()
+            .map(|e| e.unwrap().file_name().into_string().unwrap())
+            .collect();
+        names.sort();
+        names
+    }
+
+    #[test]
+    fn what_killed_writers_left_goes_and_nothing_else() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.dph");
+        let put = |name: &str| std::fs::write(folder.path().join(name), b"x").unwrap();
+        let mine = stem(&path);
+        put(&format!("{mine}abc123"));
+        put(&format!("{mine}XYZ789"));
+        let mut others = vec![
+            format!("{mine}abc"),
+            format!("{mine}abc12."),
+            format!("{}abc123", stem(&folder.path().join("b.dph"))),
+            ".diaphane-abc123".to_owned(),
+            "a.dph".to_owned(),
+        ];
+        others.iter().for_each(|name| put(name));
+        std::fs::create_dir(folder.path().join(format!("{mine}folder"))).unwrap();
+        others.push(format!("{mine}folder"));
+        let at_work = temporary(&path).unwrap();
+        others.push(at_work.path().file_name().unwrap().to_str().unwrap().to_owned());
+        others.sort();
+        assert_eq!(remove_unfinished(&path), 2);
+        assert_eq!(names(folder.path()), others);
+        assert_eq!(remove_unfinished(&path), 0);
+        assert_eq!(remove_unfinished(&folder.path().join("missing/a.dph")), 0);
+    }
+
+    #[test]
+    fn names_as_long_as_they_can_be_are_written() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("n".repeat(255));
+        write_atomically(&path, b"x").unwrap();
+        assert_eq!(names(folder.path()).len(), 1);
+    }
+
+    #[test]
+    fn writers_and_removers_at_once_lose_nothing() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.dph");
+        std::thread::scope(|scope| {
+            let writers: Vec<_> = (0..4)
+                .map(|k| {
+                    let path = &path;
+                    scope.spawn(move || {
+                        for _ in 0..200 {
+                            write_scratch(path, &[k; 1000]).unwrap();
+                        }
+                    })
+                })
+                .collect();
+            while writers.iter().any(|w| !w.is_finished()) {
+                remove_unfinished(&path);
+            }
+        });
+        let bytes = read(&path).unwrap();
+        assert!(bytes.len() == 1000 && bytes.iter().all(|b| *b == bytes[0]));
+        assert_eq!(names(folder.path()), ["a.dph"]);
     }
 }

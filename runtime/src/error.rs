@@ -19,6 +19,14 @@ pub enum Error {
     /// A host program asked for something that makes no sense.
     #[error("{0}")]
     Host(String),
+    /// The GPU went away: it was unplugged or reset, or its driver gave up. All that was made on it is gone.
+    #[error("the GPU was lost ({0}); if that happens again use the CPU backend")]
+    Lost(String),
+    /// The GPU has no memory for something.
+    #[error(
+        "the GPU has no memory for {0}; draw a smaller picture, close other programs or use the CPU backend"
+    )]
+    GpuMemory(String),
     /// The GPU failed while drawing.
     #[error("the GPU failed: {0}")]
     Gpu(String),

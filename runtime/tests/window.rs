@@ -8,8 +8,11 @@ mod objects;
 
 use diaphane_formats::asset;
 use diaphane_runtime::gpu::{GpuDevice, instance};
+use std::io::{BufRead, BufReader};
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::{Command, Output, Stdio};
+use std::sync::mpsc::RecvTimeoutError;
+use std::time::{Duration, Instant};
 
 const PLAY: &str = env!("CARGO_BIN_EXE_diaphane-play");
 
@@ -65,6 +68,90 @@ fn opens_draws_and_shows_the_object_beside_the_panel() {
     assert_eq!(light(2, 2), 0, "nothing is drawn around it");
     let panel = (0..height).flat_map(|y| (width - 290..width - 10).map(move |x| (x, y)));
     assert!(panel.filter(|&(x, y)| light(x, y) > 300).count() > 500, "the panel has text");
+}
+
+/// Shows an asset and a scene for many frames while both are replaced: by good ones until that is told, then by broken ones, then by
+/// good ones again. What it says, line by line.
+#[test]
+fn files_that_change_are_shown_and_broken_ones_are_not() {
+    let software = match GpuDevice::open(&instance(), None) {
+        Ok(gpu) => gpu.is_software(),
+        Err(e) => {
+            assert!(!required("GPU"), "a GPU is required here: {e}");
+            return tell(&format!("skipped: no adapter ({e})"));
+        }
+    };
+    // Long enough for files to be replaced meanwhile.
+    let frames = if software { "200" } else { "1000" };
+    let folder = tempfile::tempdir().unwrap();
+    let (asset, scene) = (ball(folder.path()), folder.path().join("s.toml"));
+    let text = |light: f64| {
+        format!(
+            "[camera]\nposition = [11, -19, 9]\ntarget = [10, -20, 5]\nvertical_fov_degrees = 36\n[image]\nwidth = 64\n\
+             height = 64\nsamples_per_pixel = 1\n[[lights]]\ntype = \"directional\"\ndirection = [0, 0, -1]\n\
+             irradiance = [{light}, {light}, {light}]\n"
+        )
+    };
+    std::fs::write(&scene, text(1.0)).unwrap();
+    let shot = folder.path().join("shot.png");
+    let run = Command::new("xvfb-run")
+        .args(["-a", "-s", "-screen 0 1280x1024x24", PLAY])
+        .arg(&asset)
+        .arg("--scene")
+        .arg(&scene)
+        .args(["--screenshot-after", frames])
+        .arg(&shot)
+        .stderr(Stdio::piped())
+        .spawn();
+    let mut run = match run {
+        Ok(run) => run,
+        Err(e) => {
+            assert!(!required("DISPLAY"), "xvfb-run is required here: {e}");
+            return tell(&format!("skipped: no virtual display ({e})"));
+        }
+    };
+    let (said, lines) = std::sync::mpsc::channel();
+    let from = BufReader::new(run.stderr.take().unwrap());
+    let reader =
+        std::thread::spawn(move || from.lines().map_while(Result::ok).for_each(|l| drop(said.send(l))));
+    let mut heard = Vec::new();
+    // Does something until a line with both parts comes.
+    let mut until = |parts: [&str; 2], change: &mut dyn FnMut()| {
+        let started = Instant::now();
+        while started.elapsed() < Duration::from_secs(60) {
+            change();
+            // Longer than the window waits for a file to rest.
+            match lines.recv_timeout(Duration::from_millis(1500)) {
+                Ok(line) => {
+                    let found = parts.iter().all(|p| line.contains(p));
+                    heard.push(line);
+                    if found {
+                        return;
+                    }
+                }
+                Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Disconnected) => break,
+            }
+        }
+        panic!("{parts:?} never came after {heard:?}");
+    };
+    let good = std::fs::read(&asset).unwrap();
+    let other = folder.path().join("other");
+    let replace = |path: &Path, bytes: &[u8]| {
+        std::fs::write(&other, bytes).unwrap();
+        std::fs::rename(&other, path).unwrap();
+    };
+    until(["ball.dph", "again"], &mut || replace(&asset, &good));
+    until(["ball.dph", "stays"], &mut || replace(&asset, &good[..good.len() / 2]));
+    until(["s.toml", "stays"], &mut || replace(&scene, b"[camera]"));
+    until(["s.toml", "again"], &mut || replace(&scene, text(2.0).as_bytes()));
+    std::fs::remove_file(&asset).unwrap();
+    until(["ball.dph", "No such file"], &mut || {});
+    assert!(run.wait().unwrap().success(), "{heard:?}");
+    reader.join().unwrap();
+    let picture = image::open(&shot).unwrap().to_rgb8();
+    let middle = picture.get_pixel((picture.width() - 300) / 2, picture.height() / 2).0;
+    assert!(middle.iter().map(|v| u32::from(*v)).sum::<u32>() > 60, "the ball shows: {middle:?}");
 }
 
 #[test]

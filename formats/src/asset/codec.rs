@@ -1,4 +1,5 @@
-//! Metadata to bytes and back: the only place that knows bincode, so that it can be replaced.
+//! Metadata to bytes and back: the only place of this crate that knows bincode, which nobody maintains any more, so that it can be
+//! replaced.
 
 use super::Info;
 use crate::{Error, Result};

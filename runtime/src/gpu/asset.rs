@@ -2,6 +2,7 @@
 
 use super::bindings::{empty_buffer, filled_buffer};
 use super::corners::Corners;
+use super::faults::allocate;
 use super::neighbours::neighbours;
 use super::packed;
 use super::pipeline::SplatPath;
@@ -78,8 +79,16 @@ impl AssetBuffers {
     /// Uploads an asset.
     ///
     /// # Errors
-    /// An asset that makes no sense, or one that is too large for the adapter's buffers.
-    pub fn new(device: &Device, asset: &Asset, path: SplatPath) -> Result<Self> {
+    /// An asset that makes no sense, or one that is too large for the adapter's buffers or memory.
+    pub fn allocate(device: &Device, asset: &Asset, path: SplatPath) -> Result<Self> {
+        let what = || {
+            let (samples, triangles) = (asset.samples.len(), asset.mesh_triangles.len());
+            format!("an asset of {samples} samples and {triangles} triangles")
+        };
+        allocate(device, what, || Self::new(device, asset, path))
+    }
+
+    fn new(device: &Device, asset: &Asset, path: SplatPath) -> Result<Self> {
         asset.validate()?;
         let (samples, info) = (usable_samples(asset), &asset.info);
         let fresnel = info.ior != 1.0;

@@ -1,6 +1,5 @@
 //! Short ways to say what wgpu wants at length: layouts, bind groups, buffers and pipelines.
 
-use wgpu::util::DeviceExt;
 use wgpu::{
     BindGroup, BindGroupDescriptor, BindGroupEntry, BindGroupLayout, BindGroupLayoutDescriptor,
     BindGroupLayoutEntry, BindingResource, BindingType, Buffer, BufferBindingType, BufferDescriptor,
@@ -134,5 +133,14 @@ pub(super) fn filled_buffer<T: bytemuck::Pod>(
 ) -> Buffer {
     let bytes: &[u8] = bytemuck::cast_slice(data);
     let contents = if bytes.len() < 16 { &[bytes, &[0; 16]].concat() } else { bytes };
-    device.create_buffer_init(&wgpu::util::BufferInitDescriptor { label: Some(label), contents, usage })
+    let size = (contents.len() as u64).next_multiple_of(wgpu::COPY_BUFFER_ALIGNMENT);
+    let descriptor = BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: true };
+    let buffer = device.create_buffer(&descriptor);
+    // Without memory or device nothing is mapped; whoever listens to the device has heard of it.
+    if let Ok(mut mapped) = buffer.get_mapped_range_mut(..) {
+        mapped.slice(..contents.len()).copy_from_slice(contents);
+        drop(mapped);
+        buffer.unmap();
+    }
+    buffer
 }

@@ -1,8 +1,8 @@
 //! Finding an adapter that can draw measured pictures, and catching what the driver complains about.
 
+use super::faults::Faults;
 use super::host::Renderer;
 use crate::{Error, Result};
-use std::sync::{Arc, Mutex, PoisonError};
 use wgpu::{
     Adapter, Backends, Device, DeviceDescriptor, DeviceType, DownlevelFlags, Features, Instance,
     InstanceDescriptor, Queue, Surface,
@@ -17,21 +17,6 @@ pub struct GpuDevice {
     /// Where it comes from.
     pub adapter: Adapter,
     faults: Faults,
-}
-
-/// The first complaint of a device since it was last asked.
-#[derive(Clone, Default)]
-struct Faults(Arc<Mutex<Option<String>>>);
-
-impl Faults {
-    fn report(&self, message: String) {
-        log::debug!("{message}");
-        self.0.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(message);
-    }
-
-    fn take(&self) -> Option<String> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner).take()
-    }
 }
 
 /// What is used where an adapter has it; times of passes too.
@@ -79,15 +64,7 @@ impl GpuDevice {
             ..Default::default()
         }))
         .map_err(|e| Error::NoAdapter(format!("{name} gives no device ({e})")))?;
-        let faults = Faults::default();
-        let report = faults.clone();
-        device.on_uncaptured_error(Arc::new(move |e| report.report(first_line(&e.to_string()))));
-        let report = faults.clone();
-        device.set_device_lost_callback(move |reason, message| {
-            if reason != wgpu::DeviceLostReason::Destroyed {
-                report.report(format!("the device was lost: {}", first_line(&message)));
-            }
-        });
+        let faults = Faults::listen(&device);
         Ok(Self { device, queue, adapter, faults })
     }
 
@@ -103,18 +80,13 @@ impl GpuDevice {
         self.adapter.get_info().device_type == DeviceType::Cpu
     }
 
-    /// The first complaint since the last call, as an error.
+    /// The first complaint since the last call, as an error; [`Error::Lost`] from the device's loss on.
     ///
     /// # Errors
     /// What the driver said, or that the device was lost.
     pub fn check(&self) -> Result<()> {
-        self.faults.take().map_or(Ok(()), |message| Err(Error::Gpu(message)))
+        self.faults.check()
     }
-}
-
-/// Errors of wgpu explain themselves over many lines; one is enough for a user, the log has the rest.
-fn first_line(message: &str) -> String {
-    message.lines().map(str::trim).filter(|l| !l.is_empty()).collect::<Vec<_>>().join("; ")
 }
 
 fn rank(kind: DeviceType) -> u32 {

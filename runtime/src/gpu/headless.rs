@@ -1,6 +1,7 @@
 //! A renderer that owns its device and reads its pictures back.
 
 use super::device::{GpuDevice, instance};
+use super::faults::wait;
 use super::pipeline::{Pipeline, SplatPath};
 use super::readback;
 use super::targets::Targets;
@@ -14,7 +15,7 @@ use diaphane_formats::asset::{Asset, Info};
 use diaphane_formats::directions::subpixel_offsets;
 use diaphane_formats::picture::Picture;
 use std::time::Instant;
-use wgpu::{Buffer, CommandEncoder};
+use wgpu::{Buffer, CommandEncoder, Device};
 
 /// Draws frames of one asset on the GPU, or on a software adapter where that is all there is.
 pub struct GpuRenderer {
@@ -31,9 +32,17 @@ impl GpuRenderer {
     /// # Errors
     /// [`Error::NoAdapter`] without a usable adapter; an asset that makes no sense or does not fit.
     pub fn new(asset: &Asset, path: Option<SplatPath>) -> Result<Self> {
-        let owned = GpuDevice::open(&instance(), None)?;
+        Self::on(GpuDevice::open(&instance(), None)?, asset, path)
+    }
+
+    /// The same on a device that is there.
+    ///
+    /// # Errors
+    /// An asset that makes no sense or does not fit.
+    pub fn on(owned: GpuDevice, asset: &Asset, path: Option<SplatPath>) -> Result<Self> {
         let path = path.unwrap_or_else(|| SplatPath::best(&owned.device));
         let renderer = Pipeline::new(&owned.device, asset, path)?;
+        wait(&owned.device)?;
         owned.check()?;
         let timers = Timers::new(&owned.device, &owned.queue, 1);
         let name = owned.describe();
@@ -43,6 +52,11 @@ impl GpuRenderer {
     /// The adapter's name, backend, and whether it is software.
     pub fn adapter(&self) -> &str {
         &self.name
+    }
+
+    /// The device that it draws with.
+    pub fn device(&self) -> &Device {
+        &self.owned.device
     }
 
     /// Whether later frames may keep the sources of an earlier one where lights and material are the same.
@@ -75,8 +89,23 @@ impl GpuRenderer {
     /// "frame", measured outside.
     ///
     /// # Errors
-    /// The GPU failed, or something is too large for it.
+    /// [`Error::Lost`] when the device is gone, which only another renderer helps against; [`Error::GpuMemory`] where not even
+    /// small tiles fit; the GPU failed, or something is too large for it.
     pub fn render(&mut self, frame: &Frame, exact: Option<&ExactDepths>) -> Result<Rendered> {
+        self.in_memory(|renderer| renderer.render_once(frame, exact))
+    }
+
+    /// Does something again in smaller tiles for as long as the device has no memory for it.
+    fn in_memory<T>(&mut self, mut draw: impl FnMut(&mut Self) -> Result<T>) -> Result<T> {
+        loop {
+            match draw(self) {
+                Err(Error::GpuMemory(what)) if self.renderer.shrink(&what) => {}
+                done => return done,
+            }
+        }
+    }
+
+    fn render_once(&mut self, frame: &Frame, exact: Option<&ExactDepths>) -> Result<Rendered> {
         let started = Instant::now();
         let offsets = subpixel_offsets(frame.samples_per_pixel as usize);
         let mut picture = Picture::new(frame.width as usize, frame.height as usize);
@@ -117,6 +146,15 @@ impl GpuRenderer {
         exact: Option<&ExactDepths>,
         offset: [f32; 2],
     ) -> Result<Vec<RayResult>> {
+        self.in_memory(|renderer| renderer.trace_once(frame, exact, offset))
+    }
+
+    fn trace_once(
+        &mut self,
+        frame: &Frame,
+        exact: Option<&ExactDepths>,
+        offset: [f32; 2],
+    ) -> Result<Vec<RayResult>> {
         let mut plain = frame.clone();
         plain.surface.reflection = false;
         let mut rays = vec![RayResult::default(); frame.width as usize * frame.height as usize];
@@ -141,6 +179,28 @@ impl GpuRenderer {
 
     /// Draws all tiles and hands each to `take`. Returns milliseconds by pass.
     fn draw(
+        &mut self,
+        frame: &Frame,
+        exact: Option<&ExactDepths>,
+        offsets: &[[f32; 2]],
+        take: impl FnMut(Tile, TileData),
+    ) -> Result<[f64; PASSES]> {
+        let drawn = self.draw_tiles(frame, exact, offsets, take);
+        let fine = self.owned.check();
+        if fine.is_ok() && drawn.is_ok() {
+            return drawn;
+        }
+        self.renderer.forget_targets();
+        // What is on its way comes in, and what was dropped is freed.
+        let waited = wait(&self.owned.device);
+        // What the device says comes before what follows from it; its loss comes before everything.
+        match (self.owned.check(), fine) {
+            (Err(lost @ Error::Lost(_)), _) | (_, Err(lost)) | (Err(lost), Ok(())) => Err(lost),
+            (Ok(()), Ok(())) => waited.and(drawn),
+        }
+    }
+
+    fn draw_tiles(
         &mut self,
         frame: &Frame,
         exact: Option<&ExactDepths>,
@@ -176,7 +236,6 @@ impl GpuRenderer {
             }
             self.read(tile, &mut milliseconds, &mut take)?;
         }
-        self.owned.check()?;
         Ok(milliseconds)
     }
 

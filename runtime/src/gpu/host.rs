@@ -10,6 +10,7 @@
 //! ordered by the distance of their centres; where two run through each other the nearer one counts as in front altogether.
 
 use super::bindings::empty_buffer;
+use super::faults::allocate;
 use super::frame::common_layout;
 use super::passes::clip::Clip;
 use super::passes::compose::Compose;
@@ -270,8 +271,27 @@ impl Renderer {
     /// Records all passes of a frame but the overlay. Call it when the commands before it have drawn the depth buffer.
     ///
     /// # Errors
-    /// A picture without pixels or too large for the device; lights that are.
+    /// A picture without pixels or too large for the device or its memory; lights that are. The encoder is then of no use any
+    /// more. The host hears of a lost device itself, and makes everything anew.
     pub fn prepare(
+        &mut self,
+        device: &Device,
+        queue: &Queue,
+        encoder: &mut CommandEncoder,
+        host: &HostFrame<'_>,
+    ) -> Result<()> {
+        let [w, h] = host.size;
+        let what = || format!("a picture of {w} x {h} pixels");
+        let done = allocate(device, what, || self.record(device, queue, encoder, host));
+        if done.is_err() {
+            // Whatever was made for this frame may be without memory.
+            (self.targets, self.picture, self.seen) = (None, None, None);
+            self.instances.iter_mut().flatten().for_each(|i| i.levels.iter_mut().for_each(|l| *l = None));
+        }
+        done
+    }
+
+    fn record(
         &mut self,
         device: &Device,
         queue: &Queue,
@@ -300,7 +320,7 @@ impl Renderer {
             self.picture = Some(self.new_picture(device, host.size));
         }
         self.overlay.write(queue, host.size, host.exposure);
-        self.fit_targets(device, &visible);
+        self.fit_targets(device, &visible)?;
         let (Some(picture), Some((targets, _))) = (&self.picture, &self.targets) else { return Ok(()) };
         encoder.clear_buffer(&picture.total, 0, None);
         encoder.clear_buffer(&picture.opaque, 0, None);
@@ -409,7 +429,7 @@ impl Renderer {
     }
 
     /// Sees that the targets hold the largest tile and all that objects keep.
-    fn fit_targets(&mut self, device: &Device, visible: &[Visible]) {
+    fn fit_targets(&mut self, device: &Device, visible: &[Visible]) -> Result<()> {
         let mut needed = Tile { start: [0; 2], size: [1; 2] };
         let mut state = PixelState::default();
         for v in visible {
@@ -423,12 +443,14 @@ impl Renderer {
         if let Some((targets, known)) = &self.targets {
             let fits = (0..2).all(|c| targets.size[c] >= needed.size[c]) && known.or(state) == *known;
             if fits {
-                return;
+                return Ok(());
             }
             state = state.or(*known);
             (0..2).for_each(|c| needed.size[c] = needed.size[c].max(targets.size[c]));
         }
-        self.targets = Some((Targets::new(device, state, needed, self.path), state));
+        let bytes = budget(device, state, TOTAL).pixel_total * needed.pixels();
+        self.targets = Some((Targets::allocate(device, state, needed, self.path, bytes)?, state));
+        Ok(())
     }
 
     fn new_picture(&self, device: &Device, size: [u32; 2]) -> Picture {

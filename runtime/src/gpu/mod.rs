@@ -17,6 +17,7 @@ mod asset;
 mod bindings;
 mod corners;
 mod device;
+mod faults;
 mod frame;
 mod headless;
 mod host;
@@ -33,6 +34,7 @@ mod timers;
 mod uniforms;
 
 pub use device::{GpuDevice, instance};
+pub use faults::{guarded, is_guarded, wait};
 pub use headless::GpuRenderer;
 pub use host::{AssetId, HostDepth, HostFrame, HostReport, InstanceId, Options, Renderer};
 pub use picture::{PictureRenderer, Request, Statistics};

@@ -1,6 +1,7 @@
 //! The renderer for programs that own device and window: it records into their command buffer and draws into their
 //! render pass.
 
+use super::faults::allocate;
 use super::passes::Recorder;
 use super::passes::display::Display;
 use super::passes::publish::Publish;
@@ -106,8 +107,25 @@ impl PictureRenderer {
     /// Records rays of a picture. [`Self::render`] then shows the mean of all rays so far.
     ///
     /// # Errors
-    /// The picture or its lights are too large for the device.
+    /// The picture or its lights are too large for the device or its memory. The encoder is then of no use any more.
     pub fn prepare(
+        &mut self,
+        device: &Device,
+        queue: &Queue,
+        encoder: &mut CommandEncoder,
+        request: &Request,
+    ) -> Result<()> {
+        let [w, h] = [request.frame.width, request.frame.height];
+        let what = || format!("a picture of {w} x {h} pixels");
+        let done = allocate(device, what, || self.record(device, queue, encoder, request));
+        if done.is_err() {
+            self.picture = None;
+            self.passes.forget_targets();
+        }
+        done
+    }
+
+    fn record(
         &mut self,
         device: &Device,
         queue: &Queue,

@@ -15,7 +15,7 @@ use super::passes::segments::Segments;
 use super::passes::slopes::Slopes;
 use super::passes::splat::Splat;
 use super::passes::surface::Surface;
-use super::targets::{COUNTERS, RADIANCE, TOTAL, Targets, budget};
+use super::targets::{COUNTERS, LEAST, RADIANCE, TOTAL, Targets, budget};
 use super::tiles::{Tile, split};
 use super::timers::Timers;
 use super::uniforms::{LightLayout, ViewUniform};
@@ -49,6 +49,8 @@ pub(super) struct Pipeline {
     targets: Option<(Targets, Groups)>,
     /// Bytes that the state of all pixels may take.
     pub(super) most_memory: u64,
+    /// Bytes that the latest targets take, about.
+    tile_memory: u64,
 }
 
 /// How kernels are summed.
@@ -127,7 +129,7 @@ impl Pipeline {
     pub fn new(device: &Device, asset: &Asset, path: SplatPath) -> Result<Self> {
         let path = path.checked(device)?;
         let common = common_layout(device);
-        let asset = AssetBuffers::new(device, asset, path)?;
+        let asset = AssetBuffers::allocate(device, asset, path)?;
         Ok(Self {
             lighting: Lighting::new(device, &common, &asset),
             fold: Fold::new(device, &common),
@@ -152,6 +154,7 @@ impl Pipeline {
             relight: true,
             targets: None,
             most_memory: TOTAL,
+            tile_memory: 0,
         })
     }
 
@@ -195,19 +198,51 @@ impl Pipeline {
         exact: Option<&ExactDepths>,
     ) -> Result<Vec<Tile>> {
         let key = self.light(device, queue, frame, exact)?;
-        let tiles =
-            split(frame.width, frame.height, budget(device, self.asset.pixel_state(), self.most_memory))?;
+        let mut tiles = self.split(device, frame)?;
         // The first tile is the largest; `split` returns at least one.
         let fits = self.targets.as_ref().is_some_and(|(t, _)| t.size == tiles[0].size);
         if !fits || self.frame.take_changed() {
-            let old = self.targets.take().map(|(t, _)| t).filter(|_| fits);
-            let targets =
-                old.unwrap_or_else(|| Targets::new(device, self.asset.pixel_state(), tiles[0], self.path()));
+            let mut old = self.targets.take().map(|(t, _)| t).filter(|_| fits);
+            let targets = loop {
+                let made = old.take().map_or_else(|| self.allocate(device, tiles[0]), Ok);
+                match made {
+                    Err(Error::GpuMemory(what)) if self.shrink(&what) => tiles = self.split(device, frame)?,
+                    made => break made?,
+                }
+            };
             let groups = self.groups(device, &targets);
             self.targets = Some((targets, groups));
         }
         self.lit = Some(key);
         Ok(tiles)
+    }
+
+    fn split(&self, device: &Device, frame: &Frame) -> Result<Vec<Tile>> {
+        split(frame.width, frame.height, budget(device, self.asset.pixel_state(), self.most_memory))
+    }
+
+    fn allocate(&mut self, device: &Device, tile: Tile) -> Result<Targets> {
+        let state = self.asset.pixel_state();
+        self.tile_memory = budget(device, state, self.most_memory).pixel_total * tile.pixels();
+        Targets::allocate(device, state, tile, self.path(), self.tile_memory)
+    }
+
+    /// Draws in tiles of half the memory from now on, because there is none for `what`. False where they are small already.
+    pub(super) fn shrink(&mut self, what: &str) -> bool {
+        let half = self.most_memory.min(self.tile_memory) / 2;
+        let may = half >= LEAST;
+        if may {
+            log::warn!("the GPU has no memory for {what}; drawing in smaller tiles");
+            self.most_memory = half;
+            self.forget_targets();
+        }
+        may
+    }
+
+    /// Forgets what the size of the picture decides, so that it is made anew.
+    pub(super) fn forget_targets(&mut self) {
+        self.targets = None;
+        self.lit = None;
     }
 
     /// Uploads a frame's lights where they need other sources. The key that comes back is to be kept in `lit` when all went
@@ -239,7 +274,7 @@ impl Pipeline {
     /// # Errors
     /// As [`Self::new`].
     pub(super) fn level(&self, device: &Device, asset: &Asset) -> Result<Self> {
-        let mut level = self.with(device, AssetBuffers::new(device, asset, self.path())?);
+        let mut level = self.with(device, AssetBuffers::allocate(device, asset, self.path())?);
         level.renew_variant(device);
         Ok(level)
     }
@@ -262,6 +297,7 @@ impl Pipeline {
             asset,
             targets: None,
             most_memory: self.most_memory,
+            tile_memory: 0,
         }
     }
 

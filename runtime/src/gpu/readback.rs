@@ -1,11 +1,12 @@
 //! Buffers and textures back to the program. Waits for the device.
 
 use super::bindings::empty_buffer;
+use super::faults::wait;
 use crate::{Error, Result};
 use std::sync::mpsc;
 use wgpu::{
-    Buffer, BufferUsages, CommandEncoder, Device, MapMode, PollType, Queue, TexelCopyBufferInfo,
-    TexelCopyBufferLayout, Texture,
+    Buffer, BufferUsages, CommandEncoder, Device, MapMode, Queue, TexelCopyBufferInfo, TexelCopyBufferLayout,
+    Texture,
 };
 
 const MAPPABLE: BufferUsages = BufferUsages::MAP_READ.union(BufferUsages::COPY_DST);
@@ -63,7 +64,7 @@ fn map(device: &Device, copies: &[Buffer]) -> Result<()> {
         // Nobody listens any more only when an earlier copy failed already.
         copy.map_async(MapMode::Read, .., move |result| drop(done.send(result)));
     }
-    device.poll(PollType::wait_indefinitely()).map_err(|e| Error::Gpu(e.to_string()))?;
+    wait(device)?;
     for _ in copies {
         let failed = || Error::Gpu("the device did not hand the picture back".to_owned());
         results.try_recv().map_err(|_| failed())?.map_err(|_| failed())?;

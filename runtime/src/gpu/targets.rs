@@ -1,8 +1,10 @@
 //! State of the pixels of one tile.
 
 use super::bindings::empty_buffer;
+use super::faults::allocate;
 use super::pipeline::SplatPath;
 use super::tiles::{Budget, Tile};
+use crate::Result;
 use crate::rendered::MAX_PIECES;
 use diaphane_formats::reconstruct::PROFILE_CELLS;
 use wgpu::{
@@ -96,9 +98,27 @@ pub(super) fn budget(device: &Device, state: PixelState, total: u64) -> Budget {
     }
 }
 
+/// Memory below which tiles are not made smaller to fit it.
+pub(super) const LEAST: u64 = 1 << 20;
+
 impl Targets {
-    /// Targets for tiles up to the size of `tile`.
-    pub fn new(device: &Device, needs: PixelState, tile: Tile, path: SplatPath) -> Self {
+    /// Targets for tiles up to the size of `tile`, which take about `bytes`.
+    ///
+    /// # Errors
+    /// [`crate::Error::GpuMemory`].
+    pub fn allocate(
+        device: &Device,
+        needs: PixelState,
+        tile: Tile,
+        path: SplatPath,
+        bytes: u64,
+    ) -> Result<Self> {
+        let [w, h] = tile.size;
+        let what = || format!("the state of {w} x {h} pixels ({:.1} MB)", bytes as f64 / 1e6);
+        allocate(device, what, || Ok(Self::new(device, needs, tile, path)))
+    }
+
+    fn new(device: &Device, needs: PixelState, tile: Tile, path: SplatPath) -> Self {
         let pixels = tile.pixels();
         let stride = pixels.next_multiple_of(16);
         let cell_stride =

@@ -3,6 +3,7 @@
 
 mod edits;
 mod endurance;
+mod faults;
 mod host;
 mod objects;
 mod scenes;

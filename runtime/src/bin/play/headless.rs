@@ -36,9 +36,7 @@ pub fn run(args: &Args, output: &Path) -> Result<()> {
     let mode: LightMode = args.light.map_or(LightMode::Baked, Into::into);
     warn(&frame, &asset.info, mode);
     let mut player = Player::with_path(&asset, args.backend.into(), args.splat.into())?;
-    if let Some(note) = player.note() {
-        eprintln!("note: {note}");
-    }
+    tell(&mut player);
     let edit = args.edit();
     player.edit(&edit)?;
     if let Some(warning) = edit.warning() {
@@ -49,16 +47,24 @@ pub fn run(args: &Args, output: &Path) -> Result<()> {
     let mut rendered = None;
     for _ in 0..args.frames {
         let started = Instant::now();
-        let frame = player.render(&frame, mode)?;
+        let frame = player.render_anyway(&asset, &frame, mode)?;
+        tell(&mut player);
         stats.add(started.elapsed().as_secs_f64() * 1e3, &frame);
         rendered = Some(frame);
     }
     let Some(rendered) = rendered else { bail!("--frames must be at least 1") };
     write(output, &rendered.picture, format)?;
     if let Some(path) = &args.stats {
-        stats.write(path)?;
+        stats.write(&player, path)?;
     }
     Ok(())
+}
+
+/// Says why something else draws than one might expect.
+fn tell(player: &mut Player) {
+    if let Some(note) = player.take_note() {
+        eprintln!("note: {note}");
+    }
 }
 
 fn format_of(output: &Path) -> Result<Format> {

@@ -14,6 +14,7 @@ use diaphane_formats::one_line;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
+    quiet_guarded_panics();
     env_logger::Builder::from_env(env_logger::Env::default().default_filter_or("error")).init();
     let done = match Arguments::try_parse() {
         Err(e) if !e.use_stderr() => {
@@ -37,6 +38,16 @@ fn main() -> ExitCode {
             ExitCode::from(2)
         }
     }
+}
+
+/// Panics of libraries about a lost device become errors, which are told in a line of their own.
+fn quiet_guarded_panics() {
+    let tell = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |info| {
+        if !diaphane_runtime::gpu::is_guarded() {
+            tell(info);
+        }
+    }));
 }
 
 #[cfg(feature = "window")]

@@ -105,8 +105,10 @@ impl Stats {
         self.splats_per_pixel = rendered.counters.splats_per_ray();
     }
 
-    /// Writes everything to `path`.
-    pub fn write(mut self, path: &Path) -> Result<()> {
+    /// Writes everything to `path`. The backend is the one that drew the last frame.
+    pub fn write(mut self, player: &Player, path: &Path) -> Result<()> {
+        (self.backend, self.adapter) = player.describe();
+        self.splat = player.path().map(SplatPath::name);
         self.frame_ms = Spread::of(&self.frame_times);
         self.pass_ms = self.pass_times.iter().map(|(name, times)| (*name, Spread::of(times))).collect();
         let mut json = serde_json::to_string_pretty(&self)?;

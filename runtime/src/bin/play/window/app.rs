@@ -1,11 +1,16 @@
 //! The window's life: events in, frames out.
 
 use super::Errand;
+use super::health::Retries;
 use super::pace::Pace;
 use super::panel;
+use super::reload::PERIOD;
 use super::screen::Screen;
 use super::session::Session;
+use super::sources::Sources;
 use anyhow::{Result, anyhow};
+use diaphane_formats::asset::Asset;
+use diaphane_runtime::Error;
 use diaphane_runtime::edit::Edit;
 use diaphane_runtime::exact::ExactDepths;
 use diaphane_runtime::frame::Frame;
@@ -27,6 +32,12 @@ pub struct App {
     pub(super) exposure: Option<f32>,
     pub(super) message: String,
     pub(super) view: Option<View>,
+    pub(super) sources: Sources,
+    /// When to look at the files again.
+    look: Instant,
+    /// When the next frame is due, if nothing happens before.
+    pub(super) due: Option<Instant>,
+    retries: Retries,
     failure: Option<anyhow::Error>,
 }
 
@@ -59,8 +70,20 @@ pub(super) struct Shown {
 
 impl App {
     /// A window to come: it opens when the system says so.
-    pub fn new(session: Session, title: String, errand: Option<Errand>) -> Self {
-        Self { session, title, errand, exposure: None, message: String::new(), view: None, failure: None }
+    pub fn new(session: Session, sources: Sources, title: String, errand: Option<Errand>) -> Self {
+        Self {
+            session,
+            title,
+            errand,
+            exposure: None,
+            message: String::new(),
+            view: None,
+            sources,
+            look: Instant::now() + PERIOD,
+            due: None,
+            retries: Retries::default(),
+            failure: None,
+        }
     }
 
     /// How it went.
@@ -82,33 +105,47 @@ impl App {
             .with_inner_size(size);
         let window =
             event_loop.create_window(attributes).map_err(|e| anyhow!("no window can be opened: {e}"))?;
-        let screen = Screen::new(Arc::new(window), &self.session.asset)?;
-        let side = screen.gpu.device.limits().max_texture_dimension_2d as usize;
-        let window = &screen.window;
-        let input = egui_winit::State::new(
-            egui::Context::default(),
-            egui::ViewportId::ROOT,
-            window,
-            Some(window.scale_factor() as f32),
-            window.theme(),
-            Some(side),
-        );
-        self.view = Some(View {
-            input,
-            pace: Pace::new(screen.gpu.is_software()),
-            adapter: screen.gpu.describe(),
-            place: [0.0; 4],
-            pointer: PhysicalPosition::default(),
-            dragging: None,
-            shift: false,
-            shown: None,
-            changed: Instant::now(),
-            frame_ms: 0.0,
-            frames: 0,
-            statistics: Statistics::default(),
-            screen,
-        });
+        self.view = Some(View::new(Arc::new(window), &self.session.asset)?);
         Ok(())
+    }
+
+    /// Opens the GPU again after it failed, for the same window: once, unless it lasts for a while.
+    fn reopen(&mut self, failure: anyhow::Error) -> Result<()> {
+        let ours = failure.downcast_ref::<Error>();
+        if !matches!(ours, Some(Error::Lost(_) | Error::GpuMemory(_) | Error::Gpu(_))) {
+            return Err(failure);
+        }
+        let Some(old) = self.view.take() else { return Err(failure) };
+        if !self.retries.allow(Instant::now()) {
+            return Err(failure.context("again soon after it was opened anew"));
+        }
+        let window = Arc::clone(&old.screen.window);
+        let (place, pointer, frames) = (old.place, old.pointer, old.frames);
+        // What is left of it may be all the memory that there is, and holds the window's surface.
+        drop(old);
+        let view =
+            View::new(window, &self.session.asset).map_err(|e| anyhow!("{failure}; opened again: {e:#}"))?;
+        self.message = format!("the GPU was opened again: {failure}");
+        eprintln!("note: {}", self.message);
+        view.screen.window.request_redraw();
+        self.view = Some(View { place, pointer, frames, ..view });
+        Ok(())
+    }
+
+    /// Looks at the files, if it is time to.
+    fn look(&mut self) {
+        let now = Instant::now();
+        if now < self.look {
+            return;
+        }
+        if let Some(message) = self.sources.look(&mut self.session, self.view.as_mut()) {
+            eprintln!("note: {message}");
+            self.message = message;
+            if let Some(view) = &self.view {
+                view.screen.window.request_redraw();
+            }
+        }
+        self.look = Instant::now() + PERIOD;
     }
 
     fn event(&mut self, event_loop: &ActiveEventLoop, event: WindowEvent) -> Result<()> {
@@ -123,7 +160,13 @@ impl App {
                 view.screen.resize(size.width, size.height);
                 view.screen.window.request_redraw();
             }
-            WindowEvent::RedrawRequested => self.redraw(event_loop)?,
+            WindowEvent::RedrawRequested if !view.screen.is_visible() => {}
+            WindowEvent::RedrawRequested => {
+                if let Err(failure) = self.redraw(event_loop) {
+                    self.reopen(failure)?;
+                }
+            }
+            WindowEvent::Occluded(false) => view.screen.window.request_redraw(),
             WindowEvent::ModifiersChanged(modifiers) => view.shift = modifiers.state().shift_key(),
             WindowEvent::MouseInput { state: ElementState::Pressed, button, .. } => {
                 view.dragging = view.over_picture().then_some(button);
@@ -161,6 +204,35 @@ impl App {
 }
 
 impl View {
+    fn new(window: Arc<Window>, asset: &Asset) -> Result<Self> {
+        let screen = Screen::new(window, asset)?;
+        let side = screen.gpu.device.limits().max_texture_dimension_2d as usize;
+        let window = &screen.window;
+        let input = egui_winit::State::new(
+            egui::Context::default(),
+            egui::ViewportId::ROOT,
+            window,
+            Some(window.scale_factor() as f32),
+            window.theme(),
+            Some(side),
+        );
+        Ok(Self {
+            input,
+            pace: Pace::new(screen.gpu.is_software()),
+            adapter: screen.gpu.describe(),
+            place: [0.0; 4],
+            pointer: PhysicalPosition::default(),
+            dragging: None,
+            shift: false,
+            shown: None,
+            changed: Instant::now(),
+            frame_ms: 0.0,
+            frames: 0,
+            statistics: Statistics::default(),
+            screen,
+        })
+    }
+
     /// Whether the pointer is over the picture and nothing of the panel floats there.
     fn over_picture(&self) -> bool {
         let [left, top, width, height] = self.place.map(f64::from);
@@ -192,12 +264,18 @@ impl ApplicationHandler for App {
     }
 
     fn about_to_wait(&mut self, event_loop: &ActiveEventLoop) {
+        if self.failure.is_some() || event_loop.exiting() {
+            return;
+        }
+        self.look();
         // A wait that has run out asks for the frame it was waiting for.
-        if let (ControlFlow::WaitUntil(when), Some(view)) = (event_loop.control_flow(), &self.view)
-            && Instant::now() >= when
+        if let Some(view) = &self.view
+            && self.due.is_some_and(|due| Instant::now() >= due)
         {
-            event_loop.set_control_flow(ControlFlow::Wait);
+            self.due = None;
             view.screen.window.request_redraw();
         }
+        let wake = self.due.map_or(self.look, |due| due.min(self.look));
+        event_loop.set_control_flow(ControlFlow::WaitUntil(wake));
     }
 }

@@ -12,7 +12,7 @@ use diaphane_runtime::frame::{Frame, View};
 use diaphane_runtime::gpu::Request;
 use glam::DVec3;
 use std::time::{Duration, Instant};
-use winit::event_loop::{ActiveEventLoop, ControlFlow};
+use winit::event_loop::ActiveEventLoop;
 
 /// Milliseconds that a saved picture may take.
 const SAVING: f64 = 5_000.0;
@@ -70,7 +70,7 @@ impl App {
             pixels_per_point: output.pixels_per_point,
             capture,
         };
-        let captured = view.screen.paint(painting)?;
+        let painted = view.screen.paint(painting)?;
         shown.rays = rays.end;
         view.statistics = view.screen.renderer.statistics().clone();
         view.frames += 1;
@@ -79,7 +79,7 @@ impl App {
         if !rays.is_empty() && view.frames > 1 {
             view.pace.learn(divisor, view.frame_ms);
         }
-        if let Some((width, height, rgb)) = captured
+        if let Some((width, height, rgb)) = painted.capture
             && let Some(errand) = self.errand.take()
         {
             write_png_bytes(&errand.file, width, height, &rgb)?;
@@ -89,25 +89,27 @@ impl App {
         if let Some(action) = action {
             self.act(action)?;
         }
-        self.plan(event_loop, output.viewport_output.values().map(|v| v.repaint_delay).min());
+        self.plan(painted.again, output.viewport_output.values().map(|v| v.repaint_delay).min());
         Ok(())
     }
 
     /// When the next frame is due: at once while there is something to refine, else when the panel or the picture's
-    /// settling asks for it.
-    fn plan(&self, event_loop: &ActiveEventLoop, panel_delay: Option<Duration>) {
+    /// settling asks for it. Where the window took no picture, after `again`.
+    fn plan(&mut self, again: Option<Duration>, panel_delay: Option<Duration>) {
         let Some(view) = &self.view else { return };
         let wanted = if view.screen.renderer.tiles() > 1 { 1 } else { RAYS };
         let settled = view.changed.elapsed() >= SETTLING;
         let unfinished = view.shown.as_ref().is_none_or(|s| s.rays < wanted);
         let delay = panel_delay.unwrap_or(Duration::MAX);
-        if self.errand.is_some() || unfinished || delay.is_zero() {
+        self.due = None;
+        if let Some(again) = again.filter(|again| !again.is_zero()) {
+            self.due = Some(Instant::now() + again);
+        } else if self.errand.is_some() || again.is_some() || unfinished || delay.is_zero() {
             view.screen.window.request_redraw();
         } else {
             let settle =
                 if settled { Duration::MAX } else { SETTLING.saturating_sub(view.changed.elapsed()) };
-            let wait = Instant::now().checked_add(delay.min(settle));
-            event_loop.set_control_flow(wait.map_or(ControlFlow::Wait, ControlFlow::WaitUntil));
+            self.due = Instant::now().checked_add(delay.min(settle));
         }
     }
 

@@ -2,12 +2,15 @@
 
 mod app;
 mod frames;
+mod health;
 mod orbit;
 mod pace;
 mod panel;
+mod reload;
 mod save;
 mod screen;
 mod session;
+mod sources;
 
 use crate::args::Args;
 use anyhow::{Context, Result, anyhow};
@@ -17,6 +20,7 @@ use diaphane_formats::{asset, scene};
 use diaphane_runtime::framing::default_scene;
 use diaphane_runtime::player::LightMode;
 use session::Session;
+use sources::Sources;
 use std::path::PathBuf;
 use winit::event_loop::EventLoop;
 
@@ -41,6 +45,8 @@ pub fn run(args: &Args) -> Result<()> {
         }
         require_writable(&errand.file)?;
     }
+    // Before the files are read, so that no change escapes.
+    let sources = Sources::new(&args.asset, args.scene.as_deref());
     let asset = asset::read(&args.asset)?;
     let scene = match &args.scene {
         Some(path) => scene::load(path)?,
@@ -59,7 +65,7 @@ pub fn run(args: &Args) -> Result<()> {
         anyhow!("no display to open a window on ({reason}); draw a picture with --output instead")
     })?;
     let title = args.asset.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
-    let mut app = App::new(session, title, errand);
+    let mut app = App::new(session, sources, title, errand);
     event_loop.run_app(&mut app).context("the window failed")?;
     app.finish()
 }

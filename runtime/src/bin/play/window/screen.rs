@@ -1,14 +1,16 @@
 //! The window's surface and what is drawn on it: the picture on the left, the panel over it.
 
+use super::health::{Acquired, Health, Next, has_pixels};
 use anyhow::{Context, Result, anyhow};
 use diaphane_formats::asset::{Asset, Info};
 use diaphane_runtime::Error;
-use diaphane_runtime::gpu::{GpuDevice, PictureRenderer, Request, instance, read_texture};
+use diaphane_runtime::gpu::{GpuDevice, PictureRenderer, Request, guarded, instance, read_texture, wait};
 use egui::{ClippedPrimitive, TexturesDelta};
 use egui_wgpu::{RendererOptions, ScreenDescriptor};
 use std::sync::Arc;
+use std::time::Duration;
 use wgpu::{
-    Color, CommandEncoder, CurrentSurfaceTexture, Extent3d, LoadOp, Operations, PollType, PresentMode,
+    Color, CommandEncoder, CurrentSurfaceTexture, Extent3d, Instance, LoadOp, Operations, PresentMode,
     RenderPassColorAttachment, RenderPassDescriptor, StoreOp, Surface, SurfaceConfiguration, Texture,
     TextureDescriptor, TextureDimension, TextureFormat, TextureUsages, TextureView,
 };
@@ -27,7 +29,11 @@ pub struct Screen {
     pub window: Arc<Window>,
     pub gpu: GpuDevice,
     pub renderer: PictureRenderer,
+    instance: Instance,
     surface: Surface<'static>,
+    health: Health,
+    /// Whether the window has pixels.
+    visible: bool,
     config: SurfaceConfiguration,
     panel: egui_wgpu::Renderer,
 }
@@ -48,8 +54,23 @@ pub struct Painting<'a> {
     pub capture: bool,
 }
 
+/// What became of a frame.
+pub struct Painted {
+    /// What was to be captured.
+    pub capture: Option<Capture>,
+    /// After how long to try again where the window took no picture.
+    pub again: Option<Duration>,
+}
+
 /// What the window showed: columns, rows, RGB bytes.
 pub type Capture = (usize, usize, Vec<u8>);
+
+/// What a window is drawn on through.
+fn surface(instance: &Instance, window: &Arc<Window>) -> Result<Surface<'static>, Error> {
+    instance
+        .create_surface(Arc::clone(window))
+        .map_err(|_| Error::NoAdapter("no driver can draw on this window".to_owned()))
+}
 
 impl Screen {
     /// Opens the best adapter that can show pictures in this window.
@@ -58,9 +79,7 @@ impl Screen {
     /// No such adapter; an asset that does not fit it.
     pub fn new(window: Arc<Window>, asset: &Asset) -> Result<Self> {
         let instance = instance();
-        let surface = instance
-            .create_surface(Arc::clone(&window))
-            .map_err(|_| Error::NoAdapter("no driver can draw on this window".to_owned()))?;
+        let surface = surface(&instance, &window)?;
         let gpu = GpuDevice::open(&instance, Some(&surface))?;
         let formats = surface.get_capabilities(&gpu.adapter).formats;
         let format = FORMATS
@@ -73,15 +92,39 @@ impl Screen {
             .context("the adapter cannot show pictures in this window")?;
         config.format = format;
         config.present_mode = PresentMode::AutoVsync;
-        surface.configure(&gpu.device, &config);
+        let visible = has_pixels(size.width, size.height);
+        if visible {
+            surface.configure(&gpu.device, &config);
+        }
         let renderer = PictureRenderer::new(&gpu.device, &gpu.queue, asset, format)?;
         let panel = egui_wgpu::Renderer::new(&gpu.device, format, RendererOptions::default());
         gpu.check()?;
-        Ok(Self { window, gpu, renderer, surface, config, panel })
+        let health = Health::default();
+        Ok(Self { window, gpu, renderer, instance, surface, health, visible, config, panel })
     }
 
-    /// Follows the window's size.
+    /// Shows another asset; the old one stays where that fails.
+    ///
+    /// # Errors
+    /// An asset that does not fit the adapter.
+    pub fn set_asset(&mut self, asset: &Asset) -> Result<()> {
+        let next = PictureRenderer::new(&self.gpu.device, &self.gpu.queue, asset, self.config.format)?;
+        self.gpu.check()?;
+        self.renderer = next;
+        Ok(())
+    }
+
+    /// Whether there is anything to draw on.
+    pub fn is_visible(&self) -> bool {
+        self.visible
+    }
+
+    /// Follows the window's size. One without pixels, as of a minimised window, is drawn on again when it has some.
     pub fn resize(&mut self, width: u32, height: u32) {
+        self.visible = has_pixels(width, height);
+        if !self.visible {
+            return;
+        }
         let side = self.gpu.device.limits().max_texture_dimension_2d;
         (self.config.width, self.config.height) = (width.clamp(1, side), height.clamp(1, side));
         self.surface.configure(&self.gpu.device, &self.config);
@@ -102,19 +145,40 @@ impl Screen {
     /// # Errors
     /// The GPU failed.
     pub fn draw(&mut self, request: &Request) -> Result<()> {
+        let drawn = self.draw_rays(request);
+        self.first_cause(drawn)
+    }
+
+    /// What the device says comes before what follows from it.
+    fn first_cause<T>(&self, done: Result<T>) -> Result<T> {
+        if done.is_err() {
+            wait(&self.gpu.device)?;
+            self.gpu.check()?;
+        }
+        done
+    }
+
+    fn draw_rays(&mut self, request: &Request) -> Result<()> {
         let (device, queue) = (&self.gpu.device, &self.gpu.queue);
         let mut encoder = device.create_command_encoder(&Default::default());
         self.renderer.prepare(device, queue, &mut encoder, request)?;
         queue.submit([encoder.finish()]);
-        device.poll(PollType::wait_indefinitely()).map_err(|e| anyhow!("the GPU failed: {e}"))?;
+        wait(device)?;
         Ok(self.gpu.check()?)
     }
 
-    /// Draws a frame and waits for it. `Ok(None)` where nothing was to be captured.
+    /// Draws a frame and waits for it.
     ///
     /// # Errors
-    /// The GPU failed.
-    pub fn paint(&mut self, painting: Painting) -> Result<Option<Capture>> {
+    /// The GPU failed; the surface did so again and again.
+    pub fn paint(&mut self, painting: Painting) -> Result<Painted> {
+        let painted = self.paint_frame(painting);
+        self.first_cause(painted)
+    }
+
+    fn paint_frame(&mut self, painting: Painting) -> Result<Painted> {
+        // The panel's renderer has no patience with a device that is gone already.
+        self.gpu.check()?;
         let (device, queue) = (&self.gpu.device, &self.gpu.queue);
         let mut encoder = device.create_command_encoder(&Default::default());
         match &painting.request {
@@ -125,22 +189,21 @@ impl Screen {
             size_in_pixels: [self.config.width, self.config.height],
             pixels_per_point: painting.pixels_per_point,
         };
-        for (id, deltas) in &painting.textures.set {
-            for delta in deltas {
-                self.panel.update_texture(device, queue, *id, delta);
-            }
-        }
         let jobs = &painting.jobs;
-        // Command buffers come back only from paint callbacks, which the panel does not use.
-        let _ = self.panel.update_buffers(device, queue, &mut encoder, jobs, &descriptor);
-        let shown = match self.surface.get_current_texture() {
-            CurrentSurfaceTexture::Success(t) | CurrentSurfaceTexture::Suboptimal(t) => Some(t),
-            CurrentSurfaceTexture::Outdated | CurrentSurfaceTexture::Lost => {
-                self.surface.configure(&self.gpu.device, &self.config);
-                None
+        guarded(|| {
+            for (id, deltas) in &painting.textures.set {
+                for delta in deltas {
+                    self.panel.update_texture(device, queue, *id, delta);
+                }
             }
-            CurrentSurfaceTexture::Timeout | CurrentSurfaceTexture::Occluded => None,
-            CurrentSurfaceTexture::Validation => return Err(anyhow!("the window's surface failed")),
+            // Command buffers come back only from paint callbacks, which the panel does not use.
+            let _ = self.panel.update_buffers(device, queue, &mut encoder, jobs, &descriptor);
+        })?;
+        let texture = self.surface.get_current_texture();
+        let next = self.health.next(Acquired::from(&texture));
+        let shown = match texture {
+            CurrentSurfaceTexture::Success(t) | CurrentSurfaceTexture::Suboptimal(t) => Some(t),
+            _ => None,
         };
         if let Some(frame) = &shown {
             let view = frame.texture.create_view(&Default::default());
@@ -161,9 +224,33 @@ impl Screen {
         }
         self.renderer.statistics();
         // Waiting keeps slow adapters from falling ever further behind the pointer.
-        self.gpu.device.poll(PollType::wait_indefinitely()).map_err(|e| anyhow!("the GPU failed: {e}"))?;
-        self.gpu.check()?;
-        copy.map(|copy| self.read(&copy)).transpose()
+        wait(&self.gpu.device)?;
+        let complaint = self.gpu.check();
+        if !matches!(complaint, Err(Error::Gpu(_))) || matches!(next, Next::Show | Next::ShowAndConfigure) {
+            complaint?;
+        }
+        let capture = copy.map(|copy| self.read(&copy)).transpose()?;
+        Ok(Painted { capture, again: self.mend(next)? })
+    }
+
+    /// Does to the surface what is due. Returns after how long to try again where the window took no picture.
+    fn mend(&mut self, next: Next) -> Result<Option<Duration>> {
+        match next {
+            Next::Show => return Ok(None),
+            Next::Later(delay) => return Ok(Some(delay)),
+            Next::GiveUp => {
+                return Err(anyhow!(
+                    "the window's surface fails again and again; draw a picture with --output instead"
+                ));
+            }
+            Next::Recreate(_) => self.surface = surface(&self.instance, &self.window)?,
+            Next::ShowAndConfigure | Next::Configure(_) => {}
+        }
+        self.surface.configure(&self.gpu.device, &self.config);
+        Ok(match next {
+            Next::Configure(delay) | Next::Recreate(delay) => Some(delay),
+            _ => None,
+        })
     }
 
     fn compose(

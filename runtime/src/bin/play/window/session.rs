@@ -3,7 +3,7 @@
 use super::orbit::Orbit;
 use anyhow::Result;
 use diaphane_formats::asset::Asset;
-use diaphane_formats::scene::Scene;
+use diaphane_formats::scene::{Camera, Scene};
 use diaphane_runtime::edit::Edit;
 use diaphane_runtime::exact::{DepthTracer, ExactDepths};
 use diaphane_runtime::frame::{Frame, FrameLight};
@@ -22,6 +22,8 @@ pub struct Session {
     pub edit: Edit,
     pub orbit: Orbit,
     pub first_orbit: Orbit,
+    /// The scene's camera as it was given.
+    camera: Camera,
     /// Lights that stand for the environment, projected once.
     environment: Vec<FrameLight>,
     tracer: DepthTracer,
@@ -40,12 +42,40 @@ impl Session {
             environment: all.lights[all.scene_lights..].to_vec(),
             tracer: DepthTracer::new(&asset)?,
             first_orbit: orbit,
+            camera: scene.camera,
             asset,
             scene,
             mode,
             edit,
             orbit,
         })
+    }
+
+    /// Shows another asset: lights, camera and material stay as the user left them.
+    ///
+    /// # Errors
+    /// As [`Self::new`]; the session then stays as it was.
+    pub fn replace_asset(&mut self, asset: Asset) -> Result<()> {
+        let next = Self::new(asset, self.scene.clone(), self.mode, self.edit)?;
+        let (orbit, first_orbit, camera) = (self.orbit, self.first_orbit, self.camera);
+        *self = Self { orbit, first_orbit, camera, ..next };
+        Ok(())
+    }
+
+    /// Shows the asset in another scene. The user's camera stays unless the scene's is another one.
+    ///
+    /// # Errors
+    /// As [`Self::new`]; the session then stays as it was.
+    pub fn replace_scene(&mut self, scene: Scene) -> Result<()> {
+        let all = Frame::new(&scene, &self.asset.info)?;
+        self.environment = all.lights[all.scene_lights..].to_vec();
+        if scene.camera != self.camera {
+            self.camera = scene.camera;
+            self.first_orbit = Orbit::new(&scene.camera, f64::from(self.asset.info.diagonal()));
+            self.orbit = self.first_orbit;
+        }
+        self.scene = scene;
+        Ok(())
     }
 
     /// The frame for a picture at `place` (left, top, width, height in pixels), with a pixel for `divisor` × `divisor`
