@@ -15,6 +15,7 @@ pub mod framing;
 pub mod gpu;
 pub mod placement;
 pub mod player;
+pub mod plot;
 pub mod rendered;
 pub mod usable;
 

@@ -25,6 +25,7 @@ mod passes;
 mod picture;
 mod pipeline;
 mod readback;
+pub mod rivals;
 mod shaders;
 mod targets;
 mod tiles;

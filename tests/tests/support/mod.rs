@@ -51,7 +51,7 @@ pub fn brightest(picture: &Picture) -> f32 {
 }
 
 /// Says why a test does nothing, past the test runner's capture of the print macros.
-fn tell(line: &str) {
+pub fn tell(line: &str) {
     use std::io::Write;
     let _ = writeln!(std::io::stderr(), "{line}");
 }
