@@ -19,6 +19,9 @@ pub enum Error {
     /// A host program asked for something that makes no sense.
     #[error("{0}")]
     Host(String),
+    /// The ray-marching rivals were asked for what they cannot draw.
+    #[error("{0}")]
+    Rival(String),
     /// The GPU failed while drawing.
     #[error("the GPU failed: {0}")]
     Gpu(String),

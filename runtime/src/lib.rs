@@ -5,6 +5,8 @@
 //!        ├─ cpu: lighting -> segments -> splat -> picture      (rayon; fallback and oracle)
 //!        └─ gpu: surface -> lighting -> splat -> resolve       (wgpu; one module and one shader per pass)
 //! ```
+//!
+//! Apart from the player: `gpu::rivals` (a ray marcher and a 3D grid to compare with) and `plot` (charts as SVG).
 
 pub mod cpu;
 pub mod edit;

@@ -65,7 +65,7 @@ impl Rivals {
     /// or whose shells overlap: the rivals know neither.
     pub fn new(asset: &Asset) -> Result<Self> {
         asset.validate()?;
-        let refuse = |what: &str| Err(Error::Gpu(format!("the ray-marching rivals know no {what}")));
+        let refuse = |what: &str| Err(Error::Rival(format!("the ray-marching rivals know no {what}")));
         if asset.info.ior != 1.0 {
             return refuse("refracting boundary (ior is not 1)");
         }
@@ -79,7 +79,7 @@ impl Rivals {
         let most = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
         let largest = 16 * hierarchy.corners.len().max(2 * hierarchy.nodes.len()) as u64;
         if largest > most || hierarchy.corners.len() >= 3 << 28 {
-            return Err(Error::Gpu("the mesh has too many triangles for the rivals".to_owned()));
+            return Err(Error::Rival("the mesh has too many triangles for the rivals".to_owned()));
         }
         let stage = Stage::new(&owned, asset, &hierarchy);
         owned.check()?;
@@ -119,7 +119,7 @@ impl Rivals {
         let limits = self.owned.device.limits();
         let size = 16 * lattice.nodes();
         if size > limits.max_storage_buffer_binding_size.min(limits.max_buffer_size) {
-            return Err(Error::Gpu(format!("a grid of {side} nodes a side does not fit the adapter")));
+            return Err(Error::Rival(format!("a grid of {side} nodes a side does not fit the adapter")));
         }
         let lit = lattice.listed.len();
         self.grid = Some(Grid::new(&self.owned.device, lattice));
@@ -131,7 +131,7 @@ impl Rivals {
     /// # Errors
     /// No grid was laid; the GPU failed.
     pub fn grid(&self, frame: &Frame, settings: Settings) -> Result<Drawn> {
-        let grid = self.grid.as_ref().ok_or_else(|| Error::Gpu("no grid was laid".to_owned()))?;
+        let grid = self.grid.as_ref().ok_or_else(|| Error::Rival("no grid was laid".to_owned()))?;
         self.stage.draw(&self.owned, frame, settings, Some(grid))
     }
 }

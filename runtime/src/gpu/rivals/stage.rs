@@ -144,7 +144,7 @@ impl Stage {
         let limits = device.limits();
         let most = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
         if bytes > most || (size_of::<LightRecord>() * frame.lights.len()) as u64 > most {
-            return Err(Error::Gpu("picture or lights are too large for the rivals".to_owned()));
+            return Err(Error::Rival("picture or lights are too large for the rivals".to_owned()));
         }
         let lights = frame.lights.iter().map(|l| LightRecord::new(l, None));
         let lights: Vec<LightRecord> = lights.chain([LightRecord::zeroed()]).collect();
@@ -248,7 +248,7 @@ impl Stage {
         picture.pixels.iter_mut().zip(texels).for_each(|(p, [r, g, b, _])| *p = [*r, *g, *b]);
         picture.coverage = Some(texels.iter().take(picture.pixels.len()).map(|t| t[3]).collect());
         if texels.iter().any(|t| t[3] < 0.0) {
-            return Err(Error::Gpu(
+            return Err(Error::Rival(
                 "the software adapter ends loops too early for rays through this mesh".to_owned(),
             ));
         }
