@@ -107,7 +107,7 @@ fn benchmarks_draw_charts_and_compare_bakes() {
 fn rivals_are_compared_at_equal_error() {
     let folder = folder("rivals");
     let arguments = ["bench", "ball.dph", "--backend", "gpu", "--part", "rivals", "--frames", "1"];
-    let more = ["--limit", "4", "--rival-size", "32", "--output", "b.json", "--plots", "charts"];
+    let more = ["--limit", "20", "--rival-size", "32", "--output", "b.json", "--plots", "charts"];
     let done = play(&folder, &[&arguments[..], &more].concat());
     let said = String::from_utf8_lossy(&done.stderr).into_owned();
     if done.status.code() == Some(2) && said.contains("no usable GPU adapter") {

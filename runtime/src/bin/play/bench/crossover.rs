@@ -12,13 +12,15 @@ pub enum Verdict {
     NotUpTo(usize),
     /// The other method does not reach the splats' error.
     OutOfReach,
+    /// Nothing was measured within the limit of time.
+    Unmeasured,
 }
 
 impl Verdict {
     /// From (lights, the other's time over the splats'), in rising order; between two of them along a line in the logarithms.
     pub fn of(ratios: &[(usize, f64)]) -> Self {
         let Some(last) = ratios.iter().rposition(|(_, r)| *r < 1.0) else {
-            return ratios.first().map_or(Self::OutOfReach, |(lights, _)| Self::From(*lights as f64));
+            return ratios.first().map_or(Self::Unmeasured, |(lights, _)| Self::From(*lights as f64));
         };
         let (n0, r0) = ratios[last];
         match ratios.get(last + 1) {
@@ -39,6 +41,7 @@ impl Verdict {
                 n => format!("splats are faster from {n} lights on"),
             },
             Self::NotUpTo(n) => format!("splats are slower up to {n} lights, the most that were measured"),
+            Self::Unmeasured => "nothing could be measured within --limit".to_owned(),
             Self::OutOfReach => "does not reach the error of the splats".to_owned(),
         }
     }
@@ -56,7 +59,7 @@ mod tests {
             (&[(1, 0.5), (4, 1.0)], "faster from 4 lights on"),
             (&[(1, 1.1), (2, 0.9), (4, 1.2), (8, 2.0)], "faster from 3 lights on"),
             (&[(1, 0.1), (64, 0.9)], "slower up to 64 lights"),
-            (&[], "does not reach"),
+            (&[], "nothing could be measured"),
         ];
         for (ratios, says) in cases {
             let text = Verdict::of(ratios).text();

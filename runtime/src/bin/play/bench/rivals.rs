@@ -26,6 +26,9 @@ const SIDES: [u32; 11] = [6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192];
 /// Voxels between two lookups of the density.
 const STRIDES: [f32; 4] = [8.0, 4.0, 2.0, 1.0];
 
+/// Why a rival has no row although its error was measured.
+const UNREACHED: &str = "does not reach the error of the splats";
+
 /// Everything that was measured.
 #[derive(Serialize)]
 pub struct Report {
@@ -107,7 +110,11 @@ pub fn run(asset: &Asset, player: &mut Player, args: &BenchArgs) -> Result<Repor
         }
     }
     for against in [Method::March, Method::Grid] {
-        let verdict = Verdict::of(&ratios(&report.rows, against));
+        let mut verdict = Verdict::of(&ratios(&report.rows, against));
+        let unreached = |s: &Skipped| s.method == against && s.why == UNREACHED;
+        if verdict == Verdict::Unmeasured && report.skipped.iter().any(unreached) {
+            verdict = Verdict::OutOfReach;
+        }
         println!("against the {}: {}", against.name(), verdict.text());
         report.crossovers.push(Crossover { against, verdict });
     }
@@ -183,7 +190,7 @@ fn equalise(
     for method in [Method::March, Method::Grid] {
         efforts[method as usize] = cheapest[method as usize].map(|(_, effort, error)| (effort, Some(error)));
         if efforts[method as usize].is_none() {
-            let why = "does not reach the error of the splats".to_owned();
+            let why = UNREACHED.to_owned();
             skip(report, method, lights, why);
         }
     }
@@ -220,6 +227,9 @@ fn time(
     let known = efforts[method as usize];
     let effort = known.map(|k| k.0);
     if method != Method::Splats && effort.is_none() {
+        if errors.is_none() {
+            skip(report, method, lights, format!("its truth would take longer than {} s", args.limit));
+        }
         return Ok(());
     }
     let frames = contest.frames(lights, [args.rival_size; 2], args.frames)?;
