@@ -27,6 +27,9 @@ pub enum Error {
         "the GPU has no memory for {0}; draw a smaller picture, close other programs or use the CPU backend"
     )]
     GpuMemory(String),
+    /// The ray-marching rivals were asked for what they cannot draw.
+    #[error("{0}")]
+    Rival(String),
     /// The GPU failed while drawing.
     #[error("the GPU failed: {0}")]
     Gpu(String),

@@ -5,6 +5,8 @@
 //!        ├─ cpu: lighting -> segments -> splat -> picture      (rayon; fallback and oracle)
 //!        └─ gpu: surface -> lighting -> splat -> resolve       (wgpu; one module and one shader per pass)
 //! ```
+//!
+//! Apart from the player: `gpu::rivals` (a ray marcher and a 3D grid to compare with) and `plot` (charts as SVG).
 
 pub mod cpu;
 pub mod edit;
@@ -15,6 +17,7 @@ pub mod framing;
 pub mod gpu;
 pub mod placement;
 pub mod player;
+pub mod plot;
 pub mod rendered;
 pub mod usable;
 

@@ -76,6 +76,55 @@ fn benchmarks_name_what_they_skip() {
     assert!(String::from_utf8_lossy(&done.stdout).contains("skipped: 4096 lights"));
     let refused = play(&folder, &[&arguments[..], &["--limit", "0"]].concat());
     assert_eq!(refused.status.code(), Some(2));
+    let refused = play(&folder, &[&arguments[..], &["--part", "rivals"]].concat());
+    assert!(String::from_utf8_lossy(&refused.stderr).contains("add --backend gpu"), "{refused:?}");
+}
+
+#[test]
+fn benchmarks_draw_charts_and_compare_bakes() {
+    let folder = folder("charts");
+    std::fs::copy(folder.join("ball.dph"), folder.join("other.dph")).unwrap();
+    let arguments = ["bench", "ball.dph", "--backend", "cpu", "--frames", "1", "--limit", "1e-6"];
+    let more = ["--also", "other.dph", "--plots", "charts", "--output", "b.json"];
+    let done = play(&folder, &[&arguments[..], &more].concat());
+    assert!(done.status.success(), "{done:?}");
+    assert!(String::from_utf8_lossy(&done.stderr).contains("the rivals need a GPU"), "{done:?}");
+    let table: serde_json::Value =
+        serde_json::from_str(&std::fs::read_to_string(folder.join("b.json")).unwrap()).unwrap();
+    let samples =
+        |key: &str| table[key].as_array().unwrap().iter().filter(|c| c["axis"] == "samples").count();
+    assert_eq!((samples("rows"), samples("skipped")), (1, 1));
+    for chart in ["lights", "resolution", "samples"] {
+        let text = std::fs::read_to_string(folder.join(format!("charts/{chart}.svg"))).unwrap();
+        assert!(text.starts_with("<svg") && text.contains("threads"), "{chart}");
+    }
+    let refused = play(&folder, &[&arguments[..], &["--also", "b.json", "--output", "b.json"]].concat());
+    assert!(String::from_utf8_lossy(&refused.stderr).contains("both input and output"), "{refused:?}");
+}
+
+/// Passes where there is no adapter, once that was said in a line.
+#[test]
+fn rivals_are_compared_at_equal_error() {
+    let folder = folder("rivals");
+    let arguments = ["bench", "ball.dph", "--backend", "gpu", "--part", "rivals", "--frames", "1"];
+    let more = ["--limit", "20", "--rival-size", "32", "--output", "b.json", "--plots", "charts"];
+    let done = play(&folder, &[&arguments[..], &more].concat());
+    let said = String::from_utf8_lossy(&done.stderr).into_owned();
+    if done.status.code() == Some(2) && said.contains("no usable GPU adapter") {
+        return;
+    }
+    assert!(done.status.success(), "{done:?}");
+    let table: serde_json::Value =
+        serde_json::from_str(&std::fs::read_to_string(folder.join("b.json")).unwrap()).unwrap();
+    let rivals = &table["rivals"];
+    assert!(rivals["adapter"].is_string() && rivals["crossovers"].as_array().unwrap().len() == 2);
+    let rows = rivals["rows"].as_array().unwrap();
+    let row = |method: &str| rows.iter().find(|r| r["method"] == method && r["lights"] == 1).unwrap();
+    let error = |method: &str| row(method)["rel_rmse"].as_f64().unwrap();
+    assert!(error("march") <= error("splats") && row("march")["effort"]["steps"].as_u64().unwrap() > 0);
+    let text = String::from_utf8_lossy(&done.stdout).into_owned();
+    assert!(text.contains("against the ray marcher: ") && text.contains("against the 3D grid: "), "{text}");
+    assert!(std::fs::read_to_string(folder.join("charts/rivals.svg")).unwrap().contains("ray marcher"));
 }
 
 #[test]

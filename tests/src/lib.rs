@@ -3,12 +3,11 @@
 //! ```text
 //! mesh, medium, scene ─> reference ─┐
 //! asset, scene ─> play ─────────────┼─> metrics ─┬─> report (error map, HTML, JSON)
-//! mesh, medium, asset ─> rivals ────┘            └─> sweep (table, summary) ─> plot
+//! mesh, medium, asset ─> rivals ────┘            └─> sweep (table, summary, charts)
 //! ```
 
 pub mod metrics;
 pub mod play;
-pub mod plot;
 pub mod range;
 pub mod reference;
 pub mod report;

@@ -160,7 +160,12 @@ impl AssetBuffers {
             grid: filled_buffer(device, "grid", grid, storage),
             centroids: filled_buffer(device, "centroids", &centroids, storage),
             spokes: filled_buffer(device, "spokes", &spokes, storage),
-            values: empty_buffer(device, "values", 16 * kernels.len() as u64, storage),
+            values: empty_buffer(
+                device,
+                "values",
+                16 * kernels.len() as u64,
+                storage | BufferUsages::COPY_DST,
+            ),
             sources: empty_buffer(device, "sources", 64 * kernels.len() as u64, storage),
             outlines: empty_buffer(device, "outlines", OUTLINE * outlined, storage),
             shown: empty_buffer(device, "shown", MAX_PIECES as u64 * shown_stride(outlined), storage),
@@ -200,8 +205,7 @@ impl AssetBuffers {
 
     /// The same object once more, with values and sources of its own.
     pub fn instance(&self, device: &Device) -> Self {
-        let own =
-            |label: &str, like: &Buffer| empty_buffer(device, label, like.size(), BufferUsages::STORAGE);
+        let own = |label: &str, like: &Buffer| empty_buffer(device, label, like.size(), like.usage());
         Self { values: own("values", &self.values), sources: own("sources", &self.sources), ..self.clone() }
     }
 

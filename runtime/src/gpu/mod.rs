@@ -10,7 +10,7 @@
 //! [`GpuRenderer`] owns its device and reads pictures back; [`PictureRenderer`] records the same passes into a command buffer,
 //! with two more for a window: publish (mean of the rays so far) and display (exposure). [`Renderer`] draws many objects into
 //! a host program's frame, with passes that clip at its depth buffer, compose objects front to back and overlay its picture. Boundary runs where `ior` is not 1, profile where the medium has a density grid. Later pieces of rays are
-//! drawn indirectly and cost next to nothing where no ray has them. Sums are kept in 32-bit floats and added in the
+//! drawn indirectly and cost next to nothing where no ray has them. [`rivals`] draws the same light in other ways. Sums are kept in 32-bit floats and added in the
 //! order of the samples: the same adapter draws the same bits every time.
 
 mod asset;
@@ -27,6 +27,7 @@ mod passes;
 mod picture;
 mod pipeline;
 mod readback;
+pub mod rivals;
 mod shaders;
 mod targets;
 mod tiles;

@@ -377,7 +377,8 @@ impl Pipeline {
         if self.asset.sample_count > 0 && self.relight {
             let mut r =
                 Recorder { encoder, timers, common: self.frame.common(), view_offset: 0, tile: [0; 2] };
-            self.lighting.record(&mut r, &groups.lighting, &self.asset);
+            let lights = self.frame.plan.single.len();
+            self.lighting.record(&mut r, &groups.lighting, &self.asset, lights);
             if !self.frame.plan.folded.is_empty() {
                 self.fold.record(&mut r, &groups.fold, &self.asset);
             }

@@ -10,7 +10,8 @@ pub(super) const SURFACE: &str = source!("shared/view", "surface");
 pub(super) const BOUNDARY: &str =
     source!("shared/view", "shared/medium", "shared/light", "shared/fresnel", "surface", "boundary");
 pub(super) const SEGMENTS: &str = source!("shared/view", "shared/medium", "segments");
-pub(super) const PROFILE: &str = source!("shared/view", "shared/medium", "shared/profile", "profile");
+pub(super) const PROFILE: &str =
+    source!("shared/view", "shared/medium", "shared/profile", "shared/density", "profile");
 pub(super) const LIGHTING: &str =
     source!("shared/view", "shared/medium", "shared/light", "shared/phase", "shared/sh", "lighting");
 pub(super) const FOLD: &str = source!("shared/view", "shared/medium", "fold");
@@ -49,6 +50,21 @@ pub(super) const LIMITS: &str = source!("limits");
 pub(super) const CLIP: &str = source!("shared/view", "clip");
 pub(super) const COMPOSE: &str = source!("shared/view", "compose");
 pub(super) const OVERLAY: &str = source!("shared/whole", "overlay");
+macro_rules! rival {
+    ($end:literal) => {
+        source!(
+            "shared/view",
+            "shared/medium",
+            "shared/light",
+            "shared/phase",
+            "shared/density",
+            "rivals/rays",
+            $end
+        )
+    };
+}
+pub(super) const RIVAL_MARCH: &str = rival!("rivals/march");
+pub(super) const RIVAL_FILL: &str = rival!("rivals/fill");
 pub(super) const PUBLISH: &str = source!("shared/view", "publish");
 pub(super) const DISPLAY: &str = source!("shared/whole", "display");
 

@@ -8,7 +8,7 @@
 @group(1) @binding(3) var<storage, read> boundary: array<u32>;      // the same of the boundary; only where ior is not 1
 @group(1) @binding(4) var<storage, read> lights: array<Light>;
 @group(1) @binding(5) var<storage, read> exact: array<vec2f>;       // [table][sample]: density length, boundary
-@group(1) @binding(6) var<storage, read_write> values: array<vec4f>; // v, weight
+@group(1) @binding(6) var<storage, read_write> values: array<vec4f>; // v, weight; between portions: sum, lights so far
 @group(1) @binding(7) var<uniform> recurrence: array<vec4f, 196>;
 @group(1) @binding(8) var<uniform> bands: array<Band, 14>;
 // First byte of the depth's codes; its order and scale (f16); the boundary's scale and the lobe (f16 x 4).
@@ -17,6 +17,7 @@
 override FRESNEL: bool = false;
 override BOUNDARY_ORDER: u32 = 0u;
 override BOUNDARY_BYTES: u32 = 0u; // of each sample's codes
+override PORTION: u32 = 256u; // most lights of a dispatch
 
 // How the codes of one band of the harmonics are read; formats/src/harmonics.rs states the layout.
 struct Band {
@@ -153,8 +154,15 @@ fn light_samples(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgrou
         decode_boundary(sample * BOUNDARY_BYTES, halves.x);
     }
     let lobe = vec3f(halves.y, unpack2x16float(record.w));
+    var first = 0u;
     var sum = vec3f(0.0);
-    for (var l = 0u; l < view.light_count; l++) {
+    if (view.light_count > PORTION) {
+        let earlier = values[sample];
+        first = u32(earlier.w);
+        sum = earlier.xyz;
+    }
+    let end = min(first + PORTION, view.light_count);
+    for (var l = first; l < end; l++) {
         let light = lights[l];
         let arriving = incident(light, x);
         if (all(arriving.irradiance == vec3f(0.0))) {
@@ -174,6 +182,10 @@ fn light_samples(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgrou
         let g = clamp(medium.mean_cosine, -light.most_cosine, light.most_cosine);
         let phase = henyey_greenstein(g, -arriving.towards, towards_camera);
         sum += arriving.irradiance * psi * phase;
+    }
+    if (end < view.light_count) {
+        values[sample] = vec4f(sum, f32(end));
+        return;
     }
     values[sample] = vec4f(min(medium.albedo * sum, vec3f(most_source())), weight);
 }

@@ -132,6 +132,17 @@ fn folded_lights() {
 }
 
 #[test]
+fn thousands_of_lights_one_by_one() {
+    // A sample of ten bands takes about 70 rounds of loops a light: more than a software adapter does at once.
+    let asset = Object { order: 10, spacing: 0.3, ..ball() }.build();
+    let mut scene = scene(outside());
+    scene.lights = scenes::crowd(4097);
+    let frame = Frame::new(&scene, &asset.info).unwrap();
+    assert_eq!(Plan::new(&frame, &asset.info, None).single.len(), 4097);
+    compare_rays("4,097 lights", &asset, &frame, None);
+}
+
+#[test]
 fn lighting_is_reused_while_the_camera_moves() {
     for path in [SplatPath::Quads, SplatPath::Tiles] {
         let asset = ball().build();

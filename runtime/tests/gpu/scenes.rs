@@ -67,6 +67,15 @@ pub fn put_light_inside(scene: &mut Scene) {
     scene.lights.push(Light::Point { position, intensity: DVec3::new(0.3, 0.2, 0.1) });
 }
 
+/// Point lights in even directions, close enough for each to differ.
+pub fn crowd(count: usize) -> Vec<Light> {
+    let light = |(k, direction): (usize, DVec3)| Light::Point {
+        position: CENTRE + 3.0 * direction,
+        intensity: DVec3::new((k % 7) as f64, 5.0 + 4.0 * direction.y, 3.0) * (3.0 / count as f64),
+    };
+    even_directions(count, 5).into_iter().enumerate().map(light).collect()
+}
+
 /// Adds directional lights in even directions.
 pub fn add_suns(scene: &mut Scene, count: usize) {
     for (k, direction) in even_directions(count, 3).into_iter().enumerate() {

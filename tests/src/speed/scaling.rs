@@ -2,10 +2,10 @@
 
 use super::bakes::{medium, seconds, timed};
 use super::ball::bumpy_ball;
-use crate::plot::{Chart, Joined, Panel, Point, Series, Unit};
 use diaphane_bake::params::{Params, Preset};
 use diaphane_bake::progress::Silent;
 use diaphane_bake::report::Report;
+use diaphane_runtime::plot::{Chart, Joined, Panel, Point, Series, Unit};
 use serde::Serialize;
 
 /// What is varied, the rest being held.
@@ -177,7 +177,7 @@ mod tests {
         four_times.report.seconds.insert("total".to_owned(), 4.0 * seconds(&one.report, "total"));
         assert!((slope(&[&one, &four_times]) - 1.0).abs() < 1e-9);
         assert!((last_slope(&[&one, &twice, &four_times]) - 2.0).abs() < 1e-9);
-        let drawn = crate::plot::render(&chart(&[one, twice, four_times]));
+        let drawn = diaphane_runtime::plot::render(&chart(&[one, twice, four_times]));
         assert!(drawn.contains("samples (slope") && drawn.contains("optical depth"));
         assert!(!drawn.contains("front"));
     }

@@ -3,7 +3,7 @@
 use super::analysis::front;
 use super::plan::{Base, EncodingName};
 use super::record::{Method, Record};
-use crate::plot::{Chart, Joined, Panel, Point, Series, Unit};
+use diaphane_runtime::plot::{Chart, Joined, Panel, Point, Series, Unit};
 
 /// What stands on the horizontal axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

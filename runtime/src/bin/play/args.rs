@@ -22,8 +22,8 @@ Examples:
       traces rays to lights that stand inside the object
   diaphane-play statue.dph --extinction-scale 0.5 --albedo 0.9,0.8,0.6 --output amber.png
       half as dense as baked, and another colour: no new bake is needed
-  diaphane-play bench statue.dph --output statue.bench.json
-      frame times against lights, resolution and level of detail";
+  diaphane-play bench statue.dph --output statue.bench.json --plots charts
+      frame times against lights, resolution and level of detail, and beside a ray marcher (bench --help)";
 
 /// Plays a baked translucent asset in a window, or draws one picture of it.
 #[derive(Debug, Parser)]
@@ -44,7 +44,8 @@ pub struct Arguments {
 /// Other things to do with an asset.
 #[derive(Debug, Subcommand)]
 pub enum Command {
-    /// Times frames along an orbit: lights, resolutions, levels of detail, one varied at a time
+    /// Times frames along an orbit: lights, resolutions, levels of detail, one varied at a time; and beside other methods
+    /// at equal error
     Bench(BenchArgs),
 }
 

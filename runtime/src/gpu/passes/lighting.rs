@@ -9,6 +9,10 @@ use super::Recorder;
 use diaphane_formats::harmonics;
 use wgpu::{BindGroup, BindGroupLayout, ComputePipeline, Device, ShaderStages};
 
+/// Most lights of a dispatch. Mesa's software adapter (22.3.6) ends the loops of a thread after 65,535 rounds altogether: a
+/// light of fourteen bands takes up to 130.
+const PORTION: u32 = 256;
+
 /// See lighting.wgsl.
 #[derive(Clone)]
 pub(crate) struct Lighting {
@@ -25,6 +29,7 @@ impl Lighting {
         let module = shaders::module(device, "lighting", shaders::LIGHTING);
         let constants = [
             ("FRESNEL", f64::from(u8::from(asset.fresnel))),
+            ("PORTION", f64::from(PORTION)),
             ("BOUNDARY_ORDER", asset.boundary_order as f64),
             ("BOUNDARY_BYTES", harmonics::bytes(asset.boundary_order) as f64),
         ];
@@ -48,10 +53,17 @@ impl Lighting {
         group(device, "lighting", &self.layout, resources.map(|b| b.as_entire_binding()).into())
     }
 
-    pub fn record(&self, r: &mut Recorder, group: &BindGroup, asset: &AssetBuffers) {
+    /// For so many lights.
+    pub fn record(&self, r: &mut Recorder, group: &BindGroup, asset: &AssetBuffers, lights: usize) {
+        let portions = (lights as u32).div_ceil(PORTION).max(1);
+        if portions > 1 {
+            r.encoder.clear_buffer(&asset.values, 0, None);
+        }
         r.compute(Pass::Lighting, &self.pipeline, group, |pass| {
             let [columns, rows] = asset.sample_groups();
-            pass.dispatch_workgroups(columns, rows, 1);
+            for _ in 0..portions {
+                pass.dispatch_workgroups(columns, rows, 1);
+            }
         });
     }
 }

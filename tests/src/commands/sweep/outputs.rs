@@ -2,8 +2,8 @@
 
 use super::arguments::{Checked, SweepBackend};
 use diaphane_formats::files::write_atomically;
+use diaphane_runtime::plot;
 use std::path::Path;
-use validation::plot;
 use validation::sweep::figures::{Against, chart};
 use validation::sweep::plan::Base;
 use validation::sweep::record::Record;

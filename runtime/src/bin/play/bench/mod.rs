@@ -1,24 +1,39 @@
-//! `diaphane-play bench`: frame times along an orbit, one thing varied at a time.
+//! `diaphane-play bench`: frame times along an orbit, one thing varied at a time, and beside other methods at equal error.
+
+mod cells;
+mod charts;
+mod crossover;
+mod error;
+mod methods;
+mod rivals;
+mod search;
 
 use crate::args::{BackendArg, SplatArg};
 use anyhow::{Result, bail};
-use clap::Args;
+use cells::{Cell, cells, predicted, scene};
+use clap::{Args, ValueEnum};
 use diaphane_formats::asset::{self, Asset};
-use diaphane_formats::directions::even_directions;
 use diaphane_formats::files;
-use diaphane_formats::scene::{Light, Scene};
+use diaphane_runtime::Error;
 use diaphane_runtime::frame::Frame;
-use diaphane_runtime::framing::default_scene;
 use diaphane_runtime::player::{LightMode, Player};
-use glam::{DQuat, DVec3};
 use serde::Serialize;
 use std::collections::BTreeMap;
-use std::f64::consts::TAU;
 use std::path::PathBuf;
 use std::time::Instant;
 
+const EXAMPLES: &str = "\
+Examples:
+  diaphane-play bench statue.dph --output statue.bench.json --plots charts
+      everything; the rivals only where a GPU draws
+  diaphane-play bench statue.dph --backend gpu --part rivals --frames 5
+      from how many lights on splats beat a ray marcher at equal error on this adapter, be it a software one
+  diaphane-play bench statue-1M.dph --also statue-100k.dph --also statue-10k.dph --part axes
+      frame times against the number of samples too";
+
 /// Options of the benchmark.
 #[derive(Debug, Args)]
+#[command(after_help = EXAMPLES)]
 pub struct BenchArgs {
     /// The baked asset (*.dph)
     pub asset: PathBuf,
@@ -34,24 +49,32 @@ pub struct BenchArgs {
     /// Cells that would take longer are skipped and named
     #[arg(long, value_name = "SECONDS", default_value_t = 60.0)]
     pub limit: f64,
+    /// What is measured
+    #[arg(long, value_enum, default_value_t = Part::All)]
+    pub part: Part,
+    /// Bakes of the same object with other numbers of samples, for an axis of samples; may be given more than once
+    #[arg(long, value_name = "A.dph")]
+    pub also: Vec<PathBuf>,
+    /// Columns and rows of the pictures in which methods are timed against each other
+    #[arg(long, value_name = "PIXELS", default_value_t = 512, value_parser = clap::value_parser!(u32).range(16..=4096))]
+    pub rival_size: u32,
+    /// Write charts (SVG) to this folder, which is made if it is absent
+    #[arg(long, value_name = "FOLDER")]
+    pub plots: Option<PathBuf>,
     /// Write the table as JSON to this file
     #[arg(long, value_name = "B.json")]
     pub output: Option<PathBuf>,
 }
 
-const LIGHTS: [usize; 7] = [1, 4, 16, 64, 256, 1024, 4096];
-const SIZES: [[u32; 2]; 6] = [[256, 256], [512, 512], [800, 800], [1024, 1024], [1920, 1080], [3840, 2160]];
-/// Of the cells that vary something else.
-const SIZE: [u32; 2] = [800, 800];
-
-/// What a cell draws.
-#[derive(Clone, Copy, Serialize)]
-struct Cell {
-    axis: &'static str,
-    lights: usize,
-    directional: bool,
-    level: usize,
-    size: [u32; 2],
+/// Parts of the benchmark.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Part {
+    /// Both, the rivals where a GPU draws
+    All,
+    /// Frame times, one thing varied at a time
+    Axes,
+    /// Splats, a ray marcher and a 3D grid of light at equal error, from 1 to 4,096 point lights
+    Rivals,
 }
 
 /// What it took.
@@ -85,6 +108,7 @@ struct Table {
     frames: u32,
     rows: Vec<Row>,
     skipped: Vec<Cell>,
+    rivals: Option<rivals::Report>,
 }
 
 /// Runs all cells and prints them.
@@ -93,28 +117,76 @@ pub fn run(args: &BenchArgs) -> Result<()> {
         bail!("--limit must be above 0, not {}", args.limit);
     }
     if let Some(output) = &args.output {
-        files::require_different(output, &args.asset)?;
+        for input in std::iter::once(&args.asset).chain(&args.also) {
+            files::require_different(output, input)?;
+        }
         files::require_writable(output)?;
     }
-    let asset = asset::read(&args.asset)?;
-    let mut player = Player::with_path(&asset, args.backend.into(), args.splat.into())?;
+    if let Some(folder) = &args.plots {
+        std::fs::create_dir_all(folder)
+            .map_err(|e| anyhow::anyhow!("cannot make the folder '{}': {e}", folder.display()))?;
+    }
+    let assets: Vec<Asset> =
+        std::iter::once(&args.asset).chain(&args.also).map(|p| asset::read(p)).collect::<Result<_, _>>()?;
+    let mut player = Player::with_path(&assets[0], args.backend.into(), args.splat.into())?;
     if let Some(note) = player.note() {
         eprintln!("note: {note}");
     }
     let (backend, adapter) = player.describe();
     let splat = player.path().map(diaphane_runtime::gpu::SplatPath::name);
     println!("{backend}, {adapter}{}", splat.map_or(String::new(), |s| format!(", {s}")));
+    let mut table = Table {
+        backend,
+        adapter,
+        splat,
+        frames: args.frames,
+        rows: Vec::new(),
+        skipped: Vec::new(),
+        rivals: None,
+    };
+    // First, while the player is that of the asset.
+    match args.part {
+        Part::Axes => {}
+        Part::All if backend != "gpu" => {
+            eprintln!(
+                "note: the rivals need a GPU, a software adapter at least (--backend gpu); they are left out"
+            );
+        }
+        Part::Rivals if backend != "gpu" => {
+            bail!("the rivals need a GPU, a software adapter at least: add --backend gpu");
+        }
+        Part::All | Part::Rivals => match rivals::run(&assets[0], &mut player, args) {
+            Ok(report) => table.rivals = Some(report),
+            Err(e) if args.part == Part::All && matches!(e.downcast_ref(), Some(Error::Rival(_))) => {
+                eprintln!("note: {e}; they are left out");
+            }
+            Err(e) => return Err(e),
+        },
+    }
+    if args.part != Part::Rivals {
+        axes(&assets, player, args, &mut table)?;
+    }
+    if let Some(output) = &args.output {
+        let json = serde_json::to_string_pretty(&table)? + "\n";
+        files::write_atomically(output, json.as_bytes())?;
+    }
+    if let Some(folder) = &args.plots {
+        charts::write(folder, &table)?;
+    }
+    Ok(())
+}
+
+/// Measures the cells of all axes.
+fn axes(assets: &[Asset], mut player: Player, args: &BenchArgs, table: &mut Table) -> Result<()> {
     println!(
         "{:<22} {:>9} {:>6} {:>11} {:>9} {:>9} {:>11}",
         "axis", "samples", "lights", "pixels", "frame ms", "light ms", "splats/ray"
     );
-    let mut table =
-        Table { backend, adapter, splat, frames: args.frames, rows: Vec::new(), skipped: Vec::new() };
-    let mut level = (0, asset.clone());
-    for cell in cells(asset.level_sizes().len()) {
-        if level.0 != cell.level {
-            level = (cell.level, asset.level(cell.level)?);
-            player = Player::with_path(&level.1, args.backend.into(), args.splat.into())?;
+    let mut played = ((0, 0), assets[0].clone());
+    for cell in cells(assets[0].level_sizes().len(), assets.len()) {
+        if played.0 != (cell.asset, cell.level) {
+            played = ((cell.asset, cell.level), assets[cell.asset].level(cell.level)?);
+            player = Player::with_path(&played.1, args.backend.into(), args.splat.into())?;
         }
         if predicted(&table.rows, &cell) * f64::from(args.frames + 1) > args.limit {
             println!(
@@ -124,7 +196,7 @@ pub fn run(args: &BenchArgs) -> Result<()> {
             table.skipped.push(cell);
             continue;
         }
-        let row = measure(&mut player, &level.1, cell, args.frames)?;
+        let row = measure(&mut player, &played.1, cell, args.frames)?;
         println!(
             "{:<22} {:>9} {:>6} {:>11} {:>9.1} {:>9.1} {:>11.1}",
             cell.axis,
@@ -137,32 +209,7 @@ pub fn run(args: &BenchArgs) -> Result<()> {
         );
         table.rows.push(row);
     }
-    if let Some(output) = &args.output {
-        let json = serde_json::to_string_pretty(&table)? + "\n";
-        files::write_atomically(output, json.as_bytes())?;
-    }
     Ok(())
-}
-
-/// All cells, those of an axis in rising order of cost; levels of detail last, because each needs a player of its own.
-fn cells(levels: usize) -> Vec<Cell> {
-    let base = Cell { axis: "", lights: 1, directional: false, level: 0, size: SIZE };
-    let point = LIGHTS.map(|lights| Cell { axis: "point lights", lights, ..base });
-    let suns = LIGHTS.map(|lights| Cell { axis: "directional lights", lights, directional: true, ..base });
-    let sizes = SIZES.map(|size| Cell { axis: "resolution", size, ..base });
-    let levels = (0..levels).map(|level| Cell { axis: "level of detail", level, ..base });
-    point.into_iter().chain(suns).chain(sizes).chain(levels).collect()
-}
-
-/// Seconds of a frame, from the cell before on the same axis: all of it grows with the pixels, lighting with the lights.
-fn predicted(rows: &[Row], cell: &Cell) -> f64 {
-    let pixels = |c: &Cell| f64::from(c.size[0]) * f64::from(c.size[1]);
-    let Some(before) = rows.last().filter(|r| r.cell.axis == cell.axis) else { return 0.0 };
-    let larger = (pixels(cell) / pixels(&before.cell)).max(1.0);
-    // Clocks of software adapters miss parts of a pass.
-    let light = before.lighting_ms().max(0.02 * before.frame_ms);
-    let more = cell.lights as f64 / before.cell.lights as f64 - 1.0;
-    1e-3 * (before.frame_ms * larger + light * more.max(0.0))
 }
 
 fn measure(player: &mut Player, asset: &Asset, cell: Cell, frames: u32) -> Result<Row> {
@@ -194,27 +241,4 @@ fn measure(player: &mut Player, asset: &Asset, cell: Cell, frames: u32) -> Resul
 fn median(mut times: Vec<f64>) -> f64 {
     times.sort_unstable_by(f64::total_cmp);
     times.get(times.len() / 2).copied().unwrap_or_default()
-}
-
-/// The default view, turned by a part of a circle; lights in even directions turn the other way, so that they move in every
-/// frame. Their sum stays the same.
-fn scene(asset: &Asset, cell: Cell, turn: f64) -> Scene {
-    let mut scene = default_scene(&asset.info);
-    let centre = DVec3::from(asset.info.centre);
-    let around = DQuat::from_rotation_y(TAU * turn);
-    scene.camera.position = centre + around * (scene.camera.position - centre);
-    scene.image.samples_per_pixel = 1;
-    [scene.image.width, scene.image.height] = cell.size;
-    let distance = 1.5 * f64::from(asset.info.diagonal());
-    let share = DVec3::splat(4.0 / cell.lights as f64);
-    let light = |d: DVec3| {
-        let d = around.inverse() * d;
-        if cell.directional {
-            Light::Directional { direction: -d, irradiance: share }
-        } else {
-            Light::Point { position: centre + distance * d, intensity: share * distance * distance }
-        }
-    };
-    scene.lights = even_directions(cell.lights.max(2), 0).into_iter().take(cell.lights).map(light).collect();
-    scene
 }
