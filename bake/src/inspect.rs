@@ -88,7 +88,8 @@ fn print_text(path: &Path, asset: &Asset, sections: &[(&'static str, usize)], by
         i.samples, i.discarded, p.directions, i.order, i.encoding, i.width_factor
     );
     for (k, level) in report::levels(asset).iter().enumerate().skip(1) {
-        println!("  level {k:<7}{} samples, width factor {}", level.samples, level.width_factor);
+        let error = level.error.map_or(String::new(), |e| format!(", error {:.2} %", 100.0 * e));
+        println!("  level {k:<7}{} samples, width factor {}{error}", level.samples, level.width_factor);
     }
     println!("  error        {}", certified(i.certificate.as_ref()));
     println!("  per sample   {:.1} bytes", bytes_per_sample(asset, sections));

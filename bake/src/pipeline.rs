@@ -115,7 +115,9 @@ impl<'a> Pipeline<'a> {
         if params.certificate {
             let key = Key::new("certificate", &(&keys.lighting, placing.width_factor))?;
             let measured = self.cache.get(&key, || self.measure(&exact, &asset))?;
-            asset.info.certificate = Some(measured.certificate(self.input.medium));
+            let (certificate, errors) = measured.certificate(self.input.medium);
+            asset.info.certificate = Some(certificate);
+            asset.levels.iter_mut().zip(errors).for_each(|(level, error)| level.error = error);
         }
         let facts = Facts {
             medium: self.input.medium,

@@ -30,12 +30,15 @@ pub struct LevelSize {
     pub samples: usize,
     /// Of their kernels, in disk radii.
     pub width_factor: f32,
+    /// Root mean square error over that of the truth, where the bake measured it.
+    pub error: Option<f64>,
 }
 
 /// The levels of an asset, that of all samples first.
 pub fn levels(asset: &Asset) -> Vec<LevelSize> {
-    let size = |(samples, width_factor)| LevelSize { samples, width_factor };
-    asset.level_sizes().into_iter().map(size).collect()
+    let errors = asset.level_errors().into_iter();
+    let size = |((samples, width_factor), error)| LevelSize { samples, width_factor, error };
+    asset.level_sizes().into_iter().zip(errors).map(size).collect()
 }
 
 /// The report of one bake.

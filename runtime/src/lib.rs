@@ -9,6 +9,7 @@
 //! Apart from the player: `gpu::rivals` (a ray marcher and a 3D grid to compare with) and `plot` (charts as SVG).
 
 pub mod cpu;
+pub mod detail;
 pub mod edit;
 pub mod exact;
 pub mod fold;

@@ -42,7 +42,7 @@ fn plays_one_level() {
     let folder = folder("level");
     let mut ball = asset::read(&folder.join("ball.dph")).unwrap();
     let weight = vec![1.0; ball.samples.len() / 4];
-    ball.levels.push(asset::Level { width_factor: 2.2, weight });
+    ball.levels.push(asset::Level { width_factor: 2.2, weight, error: None });
     asset::write(&folder.join("ball.dph"), &ball).unwrap();
     let arguments = ["ball.dph", "--scene", "a.scene.toml", "--backend", "cpu", "--output", "o.exr"];
     let level = |k: &str| play(&folder, &[&arguments[..], &["--stats", "s.json", "--level", k]].concat());

@@ -53,6 +53,8 @@ pub(crate) struct Measured {
     played: Vec<Vec<f32>>,
     /// Under the exact lights.
     with_exact_light: Vec<Vec<f32>>,
+    /// Of each coarser level under the same lights, which it stores.
+    coarser: Vec<Vec<Vec<f32>>>,
 }
 
 /// Plays `packed` with views, rays and lights drawn from `seed`; `exact` holds for each of [`exact_lights`] what arrives
@@ -65,7 +67,7 @@ pub(crate) fn measure(
     seed: u64,
     stage: Stage<'_>,
 ) -> Result<Measured> {
-    stage.announce(VIEWS + 2 * LIGHTS + EXACT.len());
+    stage.announce(VIEWS + 2 * LIGHTS + EXACT.len() * (1 + packed.levels.len()));
     // As a reader gets it, after all rounding.
     let asset = asset::parse(&asset::encode(packed)?)?;
     stage.step(0)?;
@@ -77,18 +79,27 @@ pub(crate) fn measure(
     let truth = nodes.radiance(shape, medium, &lights, stage)?;
     let stored = Stored::new(&asset, &lights);
     let means = means_share(asset.info.ratio());
+    let few = EXACT.map(|l| lights[l]);
+    let coarser = (1..=asset.levels.len()).map(|k| {
+        let level = asset.level(k)?;
+        let stored = Stored::new(&level, &few);
+        Player::new(&level, &views).radiance(EXACT.len(), |i, l| stored.arriving(i, l, l % 3), means, stage)
+    });
+    let coarser = coarser.collect::<Result<_>>()?;
     Ok(Measured {
         seed,
         views: views.iter().map(|v| (v.direction, v.rays.len())).collect(),
         truth,
         played: player.radiance(LIGHTS, |i, l| stored.arriving(i, l, l % 3), means, stage)?,
         with_exact_light: player.radiance(EXACT.len(), |i, l| exact[l][i], Vec3::ONE, stage)?,
+        coarser,
     })
 }
 
 impl Measured {
-    /// The certificate for the albedo and phase function of `medium`.
-    pub fn certificate(&self, medium: &Medium) -> Certificate {
+    /// The certificate for the albedo and phase function of `medium`, and the errors of the coarser levels: they are measured
+    /// under fewer lights, and scaled by what all samples show under these.
+    pub fn certificate(&self, medium: &Medium) -> (Certificate, Vec<Option<f32>>) {
         let lights = lights(self.seed);
         let pictures = Pictures {
             views: &self.views,
@@ -106,9 +117,16 @@ impl Measured {
             played: &self.with_exact_light,
             ..pictures
         };
-        let error = pictures.figures().map(|figures| {
+        let figures = pictures.figures();
+        let with_stored_light = pictures.single(EXACT);
+        let coarser = |played: &Vec<Vec<f32>>| {
+            let own = Pictures { played, ..near }.single(0..EXACT.len())?;
+            let all = with_stored_light.filter(|all| *all > 0.0)?;
+            Some((figures.as_ref()?.rel_rmse * (own / all).sqrt()) as f32)
+        };
+        let levels = self.coarser.iter().map(coarser).collect();
+        let error = figures.as_ref().map(|figures| {
             let with_exact_light = near.single(0..EXACT.len());
-            let with_stored_light = pictures.single(EXACT);
             let share = match (with_exact_light, with_stored_light) {
                 (Some(exact), Some(stored)) if stored > 0.0 => (exact / stored).min(1.0),
                 _ => 1.0,
@@ -122,6 +140,8 @@ impl Measured {
             }
         });
         let rays = self.views.iter().map(|v| v.1 as u32).sum();
-        Certificate { error, rays, views: VIEWS as u32, lights: LIGHTS as u32, seed: self.seed }
+        let certificate =
+            Certificate { error, rays, views: VIEWS as u32, lights: LIGHTS as u32, seed: self.seed };
+        (certificate, levels)
     }
 }

@@ -40,7 +40,7 @@ impl Nested {
     pub fn weights(self) -> (Vec<f32>, Vec<Level>) {
         let mut levels = self.levels.into_iter();
         let finest = levels.next().map(|(weight, _)| weight).unwrap_or_default();
-        (finest, levels.map(|(weight, width_factor)| Level { width_factor, weight }).collect())
+        (finest, levels.map(|(weight, width_factor)| Level { width_factor, weight, error: None }).collect())
     }
 
     /// `values` in the order.

@@ -64,12 +64,15 @@ pub(super) enum Kind {
     LevelWidth = 15,
     /// u64 each: counts of rarer repairs of the mesh; absent where all are 0.
     Mending = 16,
+    /// f32 a level but the finest, the coarsest first: measured error; absent where nothing was measured.
+    LevelError = 17,
 }
 
 impl Kind {
-    pub(super) const ALL: [(Self, &'static str); 16] = [
+    pub(super) const ALL: [(Self, &'static str); 17] = [
         (Self::Info, "info"),
         (Self::LevelWidth, "level_width"),
+        (Self::LevelError, "level_error"),
         (Self::Place, "place"),
         (Self::Offset, "offset"),
         (Self::Weight, "weight"),

@@ -17,6 +17,9 @@ pub struct Level {
     pub width_factor: f32,
     /// Partition-of-unity weight of each of its kernels, as many as it has samples, ≥ 0; an f16.
     pub weight: Vec<f32>,
+    /// Its error as the bake measured it: root mean square over that of the truth, as [`super::CertifiedError::rel_rmse`] is for
+    /// all samples.
+    pub error: Option<f32>,
 }
 
 /// Checks that each level has fewer samples than the one before it, the first fewer than `samples`.
@@ -33,6 +36,9 @@ pub(super) fn validate(levels: &[Level], samples: usize) -> Result<()> {
         finer = level.weight.len();
         if !(level.width_factor > 0.0 && level.width_factor.is_finite()) {
             return fail("have a width factor out of range");
+        }
+        if !level.error.is_none_or(|e| e.is_finite() && e >= 0.0) {
+            return fail("have errors out of range");
         }
         if !level.weight.iter().all(|w| w.is_finite() && *w >= 0.0) {
             return fail("have weights out of range");
@@ -53,6 +59,12 @@ impl Asset {
     pub fn level_sizes(&self) -> Vec<(usize, f32)> {
         let coarser = self.levels.iter().map(|l| (l.weight.len(), l.width_factor));
         std::iter::once((self.samples.len(), self.info.width_factor)).chain(coarser).collect()
+    }
+
+    /// Measured error of each level, level 0 first: root mean square over that of the truth.
+    pub fn level_errors(&self) -> Vec<Option<f64>> {
+        let all = self.info.certificate.and_then(|c| c.error).map(|e| e.rel_rmse);
+        std::iter::once(all).chain(self.levels.iter().map(|l| l.error.map(f64::from))).collect()
     }
 
     /// Level `level` alone, as an asset without coarser levels; level 0 are all samples. The certificate is that of

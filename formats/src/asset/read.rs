@@ -115,16 +115,16 @@ impl<'a> Parts<'a> {
     }
 
     /// The coarser ones of the levels that end with these parts, the finest of them first.
-    fn levels(&self, widths: &[f32]) -> Result<Vec<Level>> {
+    fn levels(&self, widths: &[f32], errors: Option<&[f32]>) -> Result<Vec<Level>> {
         let mut samples = 0;
         let mut levels = Vec::new();
-        for (part, width_factor) in (1..self.last).zip(widths) {
+        for (part, (k, width_factor)) in (1..self.last).zip(widths.iter().enumerate()) {
             let weight = self.weight(part)?;
             samples += self.need(Kind::Place, part)?.len() / PLACE;
             if samples != weight.len() {
                 return Err(Error::invalid("the asset's levels of detail and samples do not fit together"));
             }
-            levels.push(Level { width_factor: *width_factor, weight });
+            levels.push(Level { width_factor: *width_factor, weight, error: errors.map(|e| e[k]) });
         }
         levels.reverse();
         Ok(levels)
@@ -166,6 +166,10 @@ impl<'a> Parts<'a> {
         if widths.len() + 1 != usize::from(self.all) {
             return Err(Error::invalid("the asset's levels of detail and their widths do not fit together"));
         }
+        let errors = self.find(Kind::LevelError, SHARED)?.map(floats).transpose()?;
+        if errors.as_ref().is_some_and(|e| e.len() != widths.len()) {
+            return Err(Error::invalid("the asset's levels of detail and their errors do not fit together"));
+        }
         if let Some(bytes) = self.find(Kind::Mending, SHARED)? {
             info.provenance.mesh_report.mending = mending(bytes)?;
         }
@@ -179,7 +183,7 @@ impl<'a> Parts<'a> {
         let asset = Asset {
             info,
             samples,
-            levels: self.levels(&widths)?,
+            levels: self.levels(&widths, errors.as_deref())?,
             mesh_positions: groups(&floats(self.need(Kind::MeshPositions, SHARED)?)?)?,
             mesh_triangles: groups(&words(self.need(Kind::MeshTriangles, SHARED)?)?)?,
             density: self.find(Kind::Density, SHARED)?.map(density).transpose()?,

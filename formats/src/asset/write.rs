@@ -51,6 +51,10 @@ fn shared(asset: &Asset) -> Result<Vec<Draft>> {
     if !asset.levels.is_empty() {
         sections.push((Kind::LevelWidth, floats(asset.levels.iter().rev().map(|l| l.width_factor))));
     }
+    let errors: Vec<f32> = asset.levels.iter().rev().filter_map(|l| l.error).collect();
+    if !errors.is_empty() && errors.len() == asset.levels.len() {
+        sections.push((Kind::LevelError, floats(errors.into_iter())));
+    }
     sections.push((Kind::DepthProfile, floats(s.depth.profile.iter().copied())));
     if !s.boundary.is_empty() {
         sections.push((Kind::BoundaryProfile, floats(s.boundary.profile.iter().copied())));

@@ -64,8 +64,6 @@ pub(super) struct AssetBuffers {
     most_density: f32,
     /// Of the widest kernel.
     least_sharpness: f32,
-    /// How far kernels reach, mesh units: the mean over the samples.
-    pub reach: f32,
     pub sample_count: u32,
     pub samples_drawn: u64,
     pub triangle_count: u32,
@@ -176,8 +174,6 @@ impl AssetBuffers {
                 grid.iter().map(|v| v[0].to_f32()).fold(0.0, f32::max)
             },
             least_sharpness: kernels.iter().map(|k| k[3]).fold(f32::INFINITY, f32::min),
-            reach: kernels.iter().map(|k| kernel::CUT_OFF_RADIUS / k[3]).sum::<f32>()
-                / kernels.len().max(1) as f32,
             sample_count: kernels.len() as u32,
             samples_drawn: samples.weight.iter().filter(|w| **w > 0.0).count() as u64,
             triangle_count: asset.mesh_triangles.len() as u32,

@@ -20,6 +20,7 @@ use super::pipeline::{Pipeline, SplatPath};
 use super::targets::{PixelState, TOTAL, Targets, budget};
 use super::tiles::{Tile, split};
 use super::timers::Timers;
+use crate::detail::{Choice, Detail, Fineness, details, pixels_at_nearest};
 use crate::edit::Edit;
 use crate::frame::{Frame, FrameLight};
 use crate::placement::{HostCamera, Placement, covered};
@@ -43,16 +44,14 @@ pub struct Options {
     pub sample_count: u32,
     /// How kernels are summed; `None`: whichever suits the device.
     pub path: Option<SplatPath>,
-    /// Levels of detail whose kernels reach no further than so many pixels are fine enough; 0: always all samples. Objects whose
-    /// density varies take a third of it. At 3.2 the bunny at 1/10 of 192 pixels is drawn with 1/16 of its samples, for 1.17 times
-    /// the error.
-    pub kernel_pixels: f32,
+    /// Which levels of detail are fine enough.
+    pub fineness: Fineness,
 }
 
 impl Options {
     /// A colour attachment alone, one sample.
     pub fn new(colour: TextureFormat) -> Self {
-        Self { colour, depth: None, sample_count: 1, path: None, kernel_pixels: 3.2 }
+        Self { colour, depth: None, sample_count: 1, path: None, fineness: Fineness::DEFAULT }
     }
 }
 
@@ -104,6 +103,8 @@ pub struct HostReport {
     pub lit: usize,
     /// Tiles of all objects.
     pub tiles: usize,
+    /// Of these, the ones between two levels of detail, which are drawn with both.
+    pub fading: usize,
     /// Samples of the levels that were drawn.
     pub samples: u64,
     /// Whether the last picture still holds, so that nothing was recorded.
@@ -117,6 +118,12 @@ struct Instance {
     info: Info,
     /// By level, those that were drawn.
     levels: Vec<Option<Pipeline>>,
+}
+
+/// An asset: its levels, level 0 first, and what is known of them.
+struct Levels {
+    pipelines: Vec<Pipeline>,
+    details: Vec<Detail>,
 }
 
 /// Buffers of the size of the picture.
@@ -142,9 +149,8 @@ pub struct Renderer {
     clip: Clip,
     limits: Limits,
     path: SplatPath,
-    kernel_pixels: f32,
-    /// Levels of each, level 0 first.
-    assets: Vec<Option<Vec<Pipeline>>>,
+    fineness: Fineness,
+    assets: Vec<Option<Levels>>,
     instances: Vec<Option<Instance>>,
     targets: Option<(Targets, PixelState)>,
     picture: Option<Picture>,
@@ -155,7 +161,7 @@ pub struct Renderer {
 /// An object that is in sight.
 struct Visible {
     instance: usize,
-    level: usize,
+    choice: Choice,
     frame: Frame,
     tiles: Vec<Tile>,
 }
@@ -177,7 +183,7 @@ impl Renderer {
             clip: Clip::new(device, &common),
             limits: Limits::new(device),
             path: options.path.unwrap_or_else(|| SplatPath::best(device)).checked(device)?,
-            kernel_pixels: options.kernel_pixels,
+            fineness: options.fineness,
             assets: Vec::new(),
             instances: Vec::new(),
             targets: None,
@@ -196,7 +202,8 @@ impl Renderer {
         let coarser = (1..asset.level_sizes().len())
             .map(|k| all.level(device, &asset.level(k)?))
             .collect::<Result<Vec<_>>>()?;
-        self.assets.push(Some(std::iter::once(all).chain(coarser).collect()));
+        let pipelines = std::iter::once(all).chain(coarser).collect();
+        self.assets.push(Some(Levels { pipelines, details: details(asset) }));
         Ok(AssetId(self.assets.len() - 1))
     }
 
@@ -219,8 +226,8 @@ impl Renderer {
     pub fn add_instance(&mut self, asset: AssetId, placement: Placement) -> Result<InstanceId> {
         placement.validate()?;
         let levels = self.assets.get(asset.0).and_then(Option::as_ref).ok_or_else(|| missing("asset"))?;
-        let info = levels[0].asset.info.clone();
-        let levels = levels.iter().map(|_| None).collect();
+        let info = levels.pipelines[0].asset.info.clone();
+        let levels = levels.pipelines.iter().map(|_| None).collect();
         self.seen = None;
         self.instances.push(Some(Instance { asset: asset.0, placement, info, levels }));
         Ok(InstanceId(self.instances.len() - 1))
@@ -243,7 +250,7 @@ impl Renderer {
     pub fn edit(&mut self, id: InstanceId, edit: &Edit) -> Result<()> {
         let asset = self.instance_mut(id)?.asset;
         let baked = self.assets.get(asset).and_then(Option::as_ref).ok_or_else(|| missing("asset"))?;
-        let info = edit.apply(&baked[0].asset.info)?;
+        let info = edit.apply(&baked.pipelines[0].asset.info)?;
         let instance = self.instance_mut(id)?;
         instance.info = info;
         instance.levels.iter_mut().for_each(|level| *level = None);
@@ -330,29 +337,32 @@ impl Renderer {
         }
         let compose = self.compose.bind(device, targets, &picture.total, &picture.opaque);
         let timers = &mut Timers::off();
-        for Visible { instance, level, frame, tiles } in &visible {
+        for Visible { instance, choice, frame, tiles } in &visible {
             let Some(instance) = &mut self.instances[*instance] else { continue };
             let Some(Some(levels)) = self.assets.get(instance.asset) else { continue };
             let Instance { placement, info, levels: own, .. } = instance;
-            let pipeline = own[*level].get_or_insert_with(|| {
-                let mut own = levels[*level].instance(device);
-                if own.asset.info.extinction != info.extinction || own.asset.info.albedo != info.albedo {
-                    own.set_own_material(device, queue, info);
-                }
-                own
-            });
-            pipeline.begin_in(device, queue, frame, targets)?;
-            pipeline.write_views(device, queue, frame, tiles, &[[0.5; 2]], 0);
-            self.report.lit += usize::from(pipeline.record_lighting(encoder, timers));
             let clip = host.depth.map(|_| {
                 let per_unit = (1.0 / placement.scale) as f32;
                 self.clip.bind(device, &picture.distances, targets, per_unit, host.size[0])
             });
-            for (view, tile) in tiles.iter().enumerate() {
-                pipeline.record_start(encoder, *tile);
-                let clip = clip.as_ref().map(|group| (&self.clip, group));
-                pipeline.record_ray(encoder, timers, view, *tile, clip);
-                self.compose.record(&mut pipeline.recorder(encoder, timers, view, *tile), &compose);
+            for (level, share) in parts(*choice) {
+                let pipeline = own[level].get_or_insert_with(|| {
+                    let mut own = levels.pipelines[level].instance(device);
+                    if own.asset.info.extinction != info.extinction || own.asset.info.albedo != info.albedo {
+                        own.set_own_material(device, queue, info);
+                    }
+                    own
+                });
+                pipeline.share = share;
+                pipeline.begin_in(device, queue, frame, targets)?;
+                pipeline.write_views(device, queue, frame, tiles, &[[0.5; 2]], 0);
+                self.report.lit += usize::from(pipeline.record_lighting(encoder, timers));
+                for (view, tile) in tiles.iter().enumerate() {
+                    pipeline.record_start(encoder, *tile);
+                    let clip = clip.as_ref().map(|group| (&self.clip, group));
+                    pipeline.record_ray(encoder, timers, view, *tile, clip);
+                    self.compose.record(&mut pipeline.recorder(encoder, timers, view, *tile), &compose);
+                }
             }
         }
         self.seen = seen;
@@ -399,33 +409,27 @@ impl Renderer {
                 report.culled += 1;
                 continue;
             };
-            let budget = budget(device, levels[0].asset.pixel_state(), TOTAL);
+            let state = levels.pipelines[0].asset.pixel_state();
+            let budget = budget(device, state, TOTAL);
             let mut tiles = split(high[0] - low[0], high[1] - low[1], budget)?;
             tiles.iter_mut().for_each(|t| t.start = [t.start[0] + low[0], t.start[1] + low[1]]);
             report.drawn += 1;
             report.tiles += tiles.len();
             let distance = host.camera.distance(placement.centre(info));
-            let level = self.level(levels, &frame, info);
-            report.samples += u64::from(levels[level].asset.sample_count);
-            visible.push((distance, Visible { instance: index, level, frame, tiles }));
+            let pixels = pixels_at_nearest(&frame, info);
+            let choice = self.fineness.choose(&levels.details, pixels, state.heterogeneous);
+            report.fading += usize::from(choice.coarser > 0.0);
+            let samples = |(level, _): (usize, f32)| u64::from(levels.pipelines[level].asset.sample_count);
+            report.samples += parts(choice).map(samples).sum::<u64>();
+            visible.push((distance, Visible { instance: index, choice, frame, tiles }));
         }
         visible.sort_by(|a, b| a.0.total_cmp(&b.0));
         Ok((visible.into_iter().map(|(_, v)| v).collect(), report))
     }
 
-    fn levels_of(&self, instance: usize) -> Option<&Vec<Pipeline>> {
+    fn levels_of(&self, instance: usize) -> Option<&Levels> {
         let instance = self.instances.get(instance)?.as_ref()?;
         self.assets.get(instance.asset)?.as_ref()
-    }
-
-    /// The coarsest level that is fine enough where the object is nearest.
-    fn level(&self, levels: &[Pipeline], frame: &Frame, info: &Info) -> usize {
-        let nearest = frame.view.origin.length() - 0.5 * info.diagonal();
-        let pixels =
-            0.5 * frame.height as f32 / (frame.view.up.length() * nearest.max(1e-6 * info.diagonal()));
-        let varies = levels[0].asset.pixel_state().heterogeneous;
-        let most = if varies { self.kernel_pixels / 3.0 } else { self.kernel_pixels };
-        (1..levels.len()).rev().find(|k| levels[*k].asset.reach * pixels <= most).unwrap_or(0)
     }
 
     /// Sees that the targets hold the largest tile and all that objects keep.
@@ -437,7 +441,7 @@ impl Renderer {
                 (0..2).for_each(|c| needed.size[c] = needed.size[c].max(tile.size[c]));
             }
             if let Some(levels) = self.levels_of(v.instance) {
-                state = state.or(levels[0].asset.pixel_state());
+                state = state.or(levels.pipelines[0].asset.pixel_state());
             }
         }
         if let Some((targets, known)) = &self.targets {
@@ -462,6 +466,16 @@ impl Renderer {
         let overlay = self.overlay.bind(device, &total, &opaque);
         Picture { size, total, opaque, distances, overlay }
     }
+}
+
+/// The levels to draw, one after the other, and their shares as view.wgsl knows them.
+fn parts(choice: Choice) -> impl Iterator<Item = (usize, f32)> {
+    let Choice { level, coarser } = choice;
+    let (first, second) = match coarser > 0.0 {
+        true => ((level, coarser - 1.0), Some((level + 1, coarser))),
+        false => ((level, 1.0), None),
+    };
+    std::iter::once(first).chain(second)
 }
 
 fn missing(what: &str) -> Error {

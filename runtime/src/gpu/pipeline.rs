@@ -47,6 +47,8 @@ pub(super) struct Pipeline {
     /// Whether the frame that was begun needs other sources.
     relight: bool,
     targets: Option<(Targets, Groups)>,
+    /// `share` of view.wgsl.
+    pub(super) share: f32,
     /// Bytes that the state of all pixels may take.
     pub(super) most_memory: u64,
     /// Bytes that the latest targets take, about.
@@ -153,6 +155,7 @@ impl Pipeline {
             lit: None,
             relight: true,
             targets: None,
+            share: 1.0,
             most_memory: TOTAL,
             tile_memory: 0,
         })
@@ -296,6 +299,7 @@ impl Pipeline {
             relight: true,
             asset,
             targets: None,
+            share: 1.0,
             most_memory: self.most_memory,
             tile_memory: 0,
         }
@@ -338,7 +342,10 @@ impl Pipeline {
                 first_scene_light: self.frame.first_scene_light,
                 means: self.frame.means,
             };
-            let view = |(&offset, rays)| ViewUniform::new(frame, diagonal, tile, offset, rays, lights);
+            let view = |(&offset, rays)| ViewUniform {
+                share: self.share,
+                ..ViewUniform::new(frame, diagonal, tile, offset, rays, lights)
+            };
             views.extend(offsets.iter().zip(before + 1..).map(view));
         }
         self.frame.write_views(device, queue, &self.common, &self.asset, &views);

@@ -38,7 +38,7 @@ pub(super) struct ViewUniform {
     pub rays: u32,
     pub means: f32,
     pub first_scene_light: u32,
-    pub unused: u32,
+    pub share: f32,
 }
 
 /// What a frame's rays need to know about its lights.
@@ -83,7 +83,7 @@ impl ViewUniform {
             rays,
             means: lights.means,
             first_scene_light: lights.first_scene_light,
-            unused: 0,
+            share: 1.0,
         }
     }
 }
@@ -253,7 +253,8 @@ mod tests {
             alpha,
             rays,
             means,
-            first_scene_light
+            first_scene_light,
+            share
         );
         mirrors!(
             MediumUniform,

@@ -13,6 +13,8 @@ fn compose(@builtin(global_invocation_id) pixel: vec3u) {
     let place = view.tile_start + pixel.xy;
     let at = place.y * view.width + place.x;
     let through = 1.0 - opaque[at].xyz;
-    total[at] += vec4f(through * radiance[index].xyz, 0.0);
-    opaque[at] = vec4f(1.0 - through * front[index].xyz, 0.0);
+    total[at] += vec4f(abs(view.share) * through * radiance[index].xyz, 0.0);
+    if (view.share > 0.0) {
+        opaque[at] = vec4f(1.0 - through * front[index].xyz, 0.0);
+    }
 }

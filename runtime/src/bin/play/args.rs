@@ -79,9 +79,10 @@ pub struct Args {
     #[arg(long, value_name = "A|R,G,B", value_parser = parse_channels, allow_hyphen_values = true)]
     pub albedo: Option<DVec3>,
     /// Play this level of detail alone, and read no more of the file than it needs: 0 are all samples, each further
-    /// one has about a quarter of them
-    #[arg(long, value_name = "K", requires = "output")]
-    pub level: Option<usize>,
+    /// one has about a quarter of them; `auto`: the coarsest that is fine enough for the object's size in the picture, by what the
+    /// bake measured of its error
+    #[arg(long, value_name = "K|auto", requires = "output", value_parser = parse_level)]
+    pub level: Option<LevelArg>,
     /// Draw the frame this many times, for timings
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1_000_000),
           requires = "output")]
@@ -102,6 +103,20 @@ impl Args {
     pub fn edit(&self) -> Edit {
         Edit { extinction_scale: self.extinction_scale.unwrap_or(DVec3::ONE), albedo: self.albedo }
     }
+}
+
+/// A level of detail.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LevelArg {
+    Auto,
+    One(usize),
+}
+
+fn parse_level(text: &str) -> Result<LevelArg, String> {
+    if text == "auto" {
+        return Ok(LevelArg::Auto);
+    }
+    text.parse().map(LevelArg::One).map_err(|_| "a level is a number from 0 on, or auto".to_owned())
 }
 
 /// [`Backend`] on the command line.

@@ -1,11 +1,13 @@
 //! One picture and its timings, without a window.
 
-use crate::args::Args;
+use crate::args::{Args, LevelArg};
 use crate::stats::Stats;
 use anyhow::{Result, bail};
+use diaphane_formats::asset::Asset;
 use diaphane_formats::files::{require_different, require_writable};
 use diaphane_formats::picture::{Display, Picture, write_exr, write_png};
 use diaphane_formats::{asset, scene};
+use diaphane_runtime::detail::{Fineness, details, pixels_at_nearest};
 use diaphane_runtime::frame::Frame;
 use diaphane_runtime::framing::default_scene;
 use diaphane_runtime::player::{LightMode, Player};
@@ -25,14 +27,15 @@ pub fn run(args: &Args, output: &Path) -> Result<()> {
     check_paths(args, output)?;
     args.edit().validate()?;
     let asset = match args.level {
-        Some(level) => asset::read_level(&args.asset, level)?,
-        None => asset::read(&args.asset)?,
+        Some(LevelArg::One(level)) => asset::read_level(&args.asset, level)?,
+        Some(LevelArg::Auto) | None => asset::read(&args.asset)?,
     };
     let scene = match &args.scene {
         Some(path) => scene::load(path)?,
         None => default_scene(&asset.info),
     };
     let frame = Frame::new(&scene, &asset.info)?;
+    let asset = if args.level == Some(LevelArg::Auto) { fine_enough(&asset, &frame)? } else { asset };
     let mode: LightMode = args.light.map_or(LightMode::Baked, Into::into);
     warn(&frame, &asset.info, mode);
     let mut player = Player::with_path(&asset, args.backend.into(), args.splat.into())?;
@@ -58,6 +61,15 @@ pub fn run(args: &Args, output: &Path) -> Result<()> {
         stats.write(&player, path)?;
     }
     Ok(())
+}
+
+/// The coarsest level that is fine enough for a frame; says which.
+fn fine_enough(asset: &Asset, frame: &Frame) -> Result<Asset> {
+    let pixels = pixels_at_nearest(frame, &asset.info);
+    let choice = Fineness::DEFAULT.choose(&details(asset), pixels, asset.density.is_some());
+    let level = asset.level(choice.level)?;
+    eprintln!("note: level of detail {}: {} samples", choice.level, level.samples.len());
+    Ok(level)
 }
 
 /// Says why something else draws than one might expect.

@@ -19,6 +19,7 @@ struct View {
     rays: u32,              // rays of each pixel drawn so far, this one included
     means: f32,             // share of the lights whose values are means over a sample's cell
     first_scene_light: u32, // of those that make highlights
+    share: f32,             // of a level of detail in an object that fades into the next; below 0: more of it follows
 }
 
 @group(0) @binding(0) var<uniform> view: View;
