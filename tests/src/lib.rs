@@ -6,6 +6,7 @@
 //! mesh, medium, asset ─> rivals ────┘            └─> sweep (table, summary) ─> plot
 //! ```
 
+pub mod hostile;
 pub mod metrics;
 pub mod play;
 pub mod plot;

@@ -15,7 +15,7 @@ use std::path::Path;
 /// # Errors
 /// Unreadable, foreign, truncated, damaged or future file, in one clear line.
 pub fn read(path: &Path) -> Result<Asset> {
-    parse(&files::read(path)?).map_err(|e| e.in_file(path))
+    parse(&files::read(path, files::Kind::Asset)?).map_err(|e| e.in_file(path))
 }
 
 /// As [`read`], from the file's bytes.
@@ -33,9 +33,9 @@ pub fn parse(bytes: &[u8]) -> Result<Asset> {
 /// As [`read`]; no such level.
 pub fn read_level(path: &Path, level: usize) -> Result<Asset> {
     let in_file = |e: Error| e.in_file(path);
-    let head = files::read_front(path, Table::MOST)?;
+    let head = files::read_front(path, files::Kind::Asset, Table::MOST)?;
     let (table, last) = find_level(&head, level).map_err(in_file)?;
-    let front = files::read_front(path, table.front(last))?;
+    let front = files::read_front(path, files::Kind::Asset, table.front(last))?;
     parse_level(&front, level).map_err(in_file)
 }
 

@@ -10,7 +10,7 @@ use std::path::Path;
 /// # Errors
 /// Unreadable file, not an OBJ, no faces, non-finite vertices, indices out of range, no enclosed volume.
 pub fn load_obj(path: &Path) -> Result<(Mesh, MeshReport)> {
-    let bytes = files::read(path)?;
+    let bytes = files::read(path, files::Kind::Mesh)?;
     parse_obj(&bytes).map_err(|e| e.in_file(path))
 }
 
