@@ -104,10 +104,16 @@ impl<'a> Parts<'a> {
         self.find(kind, part)?.ok_or_else(lacks)
     }
 
-    /// All parts of samples one after the other; nothing where a part has no such section.
+    /// All parts of samples one after the other; nothing where none has such a section. All or none must have it, so that
+    /// each level can be read alone.
     fn joined(&self, kind: Kind) -> Result<Vec<u8>> {
         let parts = (1..=self.last).filter_map(|part| self.find(kind, part).transpose());
-        Ok(parts.collect::<Result<Vec<_>>>()?.concat())
+        let parts = parts.collect::<Result<Vec<_>>>()?;
+        if parts.is_empty() || parts.len() == usize::from(self.last) {
+            Ok(parts.concat())
+        } else {
+            Err(Error::invalid(format!("some parts of the asset lack section {}", kind as u16)))
+        }
     }
 
     fn weight(&self, part: u16) -> Result<Vec<f32>> {
