@@ -152,7 +152,10 @@ mod tests {
             (&format!("{bake}output = \"o\"\nseed = [1]"), "'seed' must be"),
             (&format!("extra = 1\n{bake}output = \"o\""), "'extra' is no part"),
             ("[[bake", "expected"),
-            (&format!("[defaults]\nreport = \"{}\"\n{bake}output = \"o\"", "r".repeat(9000)), "'defaults' is longer"),
+            (
+                &format!("[defaults]\nreport = \"{}\"\n{bake}output = \"o\"", "r".repeat(9000)),
+                "'defaults' is longer",
+            ),
         ] {
             let error = format!("{:#}", lines(text).unwrap_err());
             assert!(error.contains(part), "{text}: {error}");

@@ -8,6 +8,7 @@ use crate::cache::{Cache, Key};
 use crate::certificate::{self, Measured};
 use crate::field::{DistanceGrid, Shape, grid_cells};
 use crate::fit::{self, FirstFits, Fits, Light, Lit};
+use crate::levels::Nested;
 use crate::measure::exact::means;
 use crate::pack::{self, Stand};
 use crate::params::{DENSITY_DIRECTIONS, Params, Visibility};
@@ -15,11 +16,10 @@ use crate::progress::Timed;
 use crate::refine::{self, Bench};
 use crate::report::{Facts, Refinement, Report};
 use crate::samples::{Candidate, Ground, Placed};
-use crate::levels::Nested;
 use crate::{Error, Input, Prepared, Result, blocks, density, layers, levels, samples};
 use diaphane_formats::asset::Asset;
-use serde::{Deserialize, Serialize};
 use glam::DVec3;
+use serde::{Deserialize, Serialize};
 use std::cell::OnceCell;
 
 /// Where samples stand.
@@ -264,8 +264,7 @@ impl<'a> Pipeline<'a> {
             let fits = match ranges.len() {
                 1 => make()?,
                 _ => {
-                    let fits =
-                        |f: &Fits| f.encoding == encoding && f.fits(lit_samples, matched, params);
+                    let fits = |f: &Fits| f.encoding == encoding && f.fits(lit_samples, matched, params);
                     self.cache.get(&Key::new("more bands", &(&keys.lighting, block))?, fits, make)?
                 }
             };

@@ -94,7 +94,8 @@ mod tests {
 
     #[test]
     fn what_a_file_holds_cannot_break_or_flood_a_message() {
-        let error = Error::file(Path::new("a\u{1b}[2J.toml"), format!("unknown key '\u{7}x\ny{}'", "z".repeat(9999)));
+        let error =
+            Error::file(Path::new("a\u{1b}[2J.toml"), format!("unknown key '\u{7}x\ny{}'", "z".repeat(9999)));
         let text = error.to_string();
         assert!(text.starts_with("'a\\u{1b}[2J.toml': unknown key '\\u{7}x yzzz"), "{text}");
         assert!(text.ends_with("z…") && text.chars().count() < LONGEST + 30, "{text}");

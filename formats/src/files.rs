@@ -203,13 +203,13 @@ mod tests {
     fn devices_and_pipes_are_refused_and_not_waited_for() {
         for device in ["/dev/zero", "/dev/stdin", "/dev/tty"].map(Path::new) {
             if device.exists() && !device.is_file() {
-                KINDS.map(|kind| assert!(message(device, kind).contains("not a regular file")));
+                KINDS.iter().for_each(|kind| assert!(message(device, *kind).contains("not a regular file")));
             }
         }
         let folder = tempfile::tempdir().unwrap();
         let pipe = folder.path().join("pipe");
         assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
-        KINDS.map(|kind| assert!(message(&pipe, kind).contains("not a regular file")));
+        KINDS.iter().for_each(|kind| assert!(message(&pipe, *kind).contains("not a regular file")));
         let link = folder.path().join("link");
         std::os::unix::fs::symlink("/dev/zero", &link).unwrap();
         assert!(message(&link, Kind::Mesh).contains("not a regular file"));
@@ -221,6 +221,6 @@ mod tests {
         let path = folder.path().join("a");
         // Without data on the disk.
         File::create(&path).unwrap().set_len(100 << 30).unwrap();
-        KINDS.map(|kind| assert!(message(&path, kind).contains("at most")));
+        KINDS.iter().for_each(|kind| assert!(message(&path, *kind).contains("at most")));
     }
 }

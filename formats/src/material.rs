@@ -118,7 +118,9 @@ fn parse_shape(table: &Table, folder: &Path) -> Result<Shape> {
     });
     let r = Reader::new(table, PLACE, &known)?;
     let solid = match kind {
-        "sphere" => Solid::Sphere { center: r.required_vector("center")?, radius: r.required_size("radius")? },
+        "sphere" => {
+            Solid::Sphere { center: r.required_vector("center")?, radius: r.required_size("radius")? }
+        }
         "box" => {
             let (min, max) = (r.required_vector("min")?, r.required_vector("max")?);
             if !min.cmplt(max).all() {

@@ -166,7 +166,10 @@ mod tests {
                 "{\"shape\":(1L,2L),\"descr\":\"<f4\",\"fortran_order\":False}",
             ] {
                 let array = parse(&file(version, header, &data)).unwrap();
-                assert_eq!(array, Array { shape: vec![1, 2], stored: Stored::Floats, values: numbers.into() });
+                assert_eq!(
+                    array,
+                    Array { shape: vec![1, 2], stored: Stored::Floats, values: numbers.into() }
+                );
             }
         }
         let bytes = "{'descr': '|u1', 'fortran_order': False, 'shape': (3,)}";

@@ -43,8 +43,7 @@ pub fn read_exr(path: &Path) -> Result<Picture> {
 pub fn parse_exr(bytes: &[u8]) -> Result<Picture> {
     use exr::prelude::*;
     let bad = |e: &str| crate::Error::invalid(format!("is not a usable EXR picture: {e}"));
-    let meta =
-        MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(|e| bad(&e.to_string()))?;
+    let meta = MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(|e| bad(&e.to_string()))?;
     for header in &meta.headers {
         check_promises(header, bytes.len()).map_err(bad)?;
     }
@@ -86,7 +85,10 @@ const MOST_TILE: usize = 1 << 14;
 
 /// A header can promise any size, and memory for it is taken before its data are read: refuses promises that a file of
 /// `length` bytes cannot keep.
-fn check_promises(header: &exr::meta::header::Header, length: usize) -> std::result::Result<(), &'static str> {
+fn check_promises(
+    header: &exr::meta::header::Header,
+    length: usize,
+) -> std::result::Result<(), &'static str> {
     use exr::meta::BlockDescription;
     if header.deep {
         return Err("it holds deep data");
@@ -215,7 +217,11 @@ pub fn read_coverage(path: &Path) -> Result<(usize, usize, Vec<f32>)> {
         let values = picture.coverage.unwrap_or_else(|| picture.pixels.iter().map(|p| p[0]).collect());
         (picture.width, picture.height, values)
     };
-    if mask.2.iter().all(|v| v.is_finite()) { Ok(mask) } else { Err(Error::file(path, "holds values that are not finite")) }
+    if mask.2.iter().all(|v| v.is_finite()) {
+        Ok(mask)
+    } else {
+        Err(Error::file(path, "holds values that are not finite"))
+    }
 }
 
 /// Columns, rows and values of a coverage mask, from the bytes of an .npy file (H×W; bytes are taken as 0..255).

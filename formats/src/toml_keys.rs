@@ -47,7 +47,9 @@ impl<'a> Reader<'a> {
     }
 
     pub(crate) fn number(&self, key: &str) -> Result<Option<f64>> {
-        self.get(key).map(|v| finite(v).ok_or_else(|| self.wrong(key, "a finite number of at most 1e30"))).transpose()
+        self.get(key)
+            .map(|v| finite(v).ok_or_else(|| self.wrong(key, "a finite number of at most 1e30")))
+            .transpose()
     }
 
     pub(crate) fn number_or(&self, key: &str, default: f64) -> Result<f64> {
@@ -97,7 +99,9 @@ impl<'a> Reader<'a> {
             .map(|v| {
                 let list = v.as_array().filter(|a| a.len() == 3);
                 let parts = list.and_then(|a| Some([finite(&a[0])?, finite(&a[1])?, finite(&a[2])?]));
-                parts.map(DVec3::from_array).ok_or_else(|| self.wrong(key, "a list of three finite numbers of at most 1e30"))
+                parts
+                    .map(DVec3::from_array)
+                    .ok_or_else(|| self.wrong(key, "a list of three finite numbers of at most 1e30"))
             })
             .transpose()
     }

@@ -92,7 +92,9 @@ impl Cache {
 fn read<T: DeserializeOwned>(path: &Path) -> std::result::Result<Option<T>, String> {
     match files::read(path, files::Kind::Kept) {
         Ok(bytes) => parse(&bytes).map(Some),
-        Err(diaphane_formats::Error::Io { cause, .. }) if cause.kind() == std::io::ErrorKind::NotFound => Ok(None),
+        Err(diaphane_formats::Error::Io { cause, .. }) if cause.kind() == std::io::ErrorKind::NotFound => {
+            Ok(None)
+        }
         Err(e) => Err(format!("could not be read ({e})")),
     }
 }

@@ -91,9 +91,8 @@ impl Measured {
     pub fn fits(&self, seed: u64) -> bool {
         let rays = self.views.iter().try_fold(0usize, |sum, view| sum.checked_add(view.1));
         let whole = |light: &Vec<f32>| Some(light.len()) == rays && light.iter().all(|v| v.is_finite());
-        let truth = |light: &Radiance| {
-            Some(light.len()) == rays && light.iter().flatten().all(|v| v.is_finite())
-        };
+        let truth =
+            |light: &Radiance| Some(light.len()) == rays && light.iter().flatten().all(|v| v.is_finite());
         self.seed == seed
             && self.views.iter().all(|view| view.0.is_finite())
             && self.truth.len() == LIGHTS

@@ -62,7 +62,9 @@ fn geometry(bytes: &[u8]) -> (Vec<u8>, bool) {
         let Some(first) = words.next() else { continue };
         match first {
             b"v" => append(&mut out, first, words.take(3)),
-            b"f" => append(&mut out, first, words.map(|word| word.split(|b| *b == b'/').next().unwrap_or(word))),
+            b"f" => {
+                append(&mut out, first, words.map(|word| word.split(|b| *b == b'/').next().unwrap_or(word)))
+            }
             b"o" | b"g" => append(&mut out, first, [&b"-"[..]].into_iter()),
             b"vt" | b"vn" => attributes = true,
             _ => {}

@@ -2,7 +2,7 @@
 #![no_main]
 
 #[path = "../../src/hostile/mod.rs"]
-#[allow(dead_code)] // The tests use the rest.
+#[allow(dead_code, unused_imports)] // The tests use the rest.
 mod hostile;
 
 use hostile::{Reader, check, reader};

@@ -37,7 +37,7 @@ pub(super) fn sections(mut bytes: &[u8]) -> Result<Use, String> {
 }
 
 /// The container, see `formats/src/asset/container.rs`.
-pub fn assemble(sections: &[(u16, u16, &[u8])]) -> Vec<u8> {
+fn assemble(sections: &[(u16, u16, &[u8])]) -> Vec<u8> {
     let align = |n: usize| n.next_multiple_of(64);
     let head = align(32 + 24 * sections.len());
     let mut bytes = vec![0; head];

@@ -13,7 +13,8 @@ use std::sync::LazyLock;
 static FOLDER: LazyLock<tempfile::TempDir> = LazyLock::new(|| {
     let folder = tempfile::tempdir().expect("a temporary folder can be made");
     let path = |name: &str| folder.path().join(name);
-    let write = |name: &str, bytes: &[u8]| std::fs::write(path(name), bytes).expect("a small file can be written");
+    let write =
+        |name: &str, bytes: &[u8]| std::fs::write(path(name), bytes).expect("a small file can be written");
     write("m.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n");
     let header = "{'descr': '<f4', 'fortran_order': False, 'shape': (1, 2, 1), }";
     let head = [b"\x93NUMPY\x01\x00", &(header.len() as u16).to_le_bytes()[..]].concat();

@@ -47,26 +47,62 @@ pub fn all() -> Vec<(&'static str, String, Vec<u8>)> {
 }
 
 const MATERIALS: [(&str, &str); 6] = [
-    ("plain", "extinction = [6.0, 6, 6]\nalbedo = [0.8, 0.8, 0.8]\nphase = { type = \"henyey-greenstein\", g = 0.3 }\nior = 1.3\n"),
-    ("layers", "extinction=[5,5,7]\nalbedo=[0.9,0.8,0.6]\nphase={type=\"isotropic\"}\n[density]\ntype=\"layers\"\naxis=[0.3,1,0.1]\nperiod=0.25\ndensities=[1.0,0.2]\n"),
-    ("noise", "extinction=[5,5,7]\nalbedo=[0.9,0.8,0.6]\n[density]\ntype=\"noise\"\nseed=3\nfrequency=2.5\noctaves=4\nrange=[0.2,1.8]\n"),
-    ("solids", "extinction=[2,2,2]\nalbedo=[0,0,1]\n[density]\ntype=\"shapes\"\nbase=1.0\n[[density.shapes]]\nshape=\"torus\"\ncenter=[0,0,0]\naxis=[0.2,0.3,1]\nradius=0.3\ntube=0.1\ndensity=20.0\nabsorb=true\n[[density.shapes]]\nshape=\"box\"\nmin=[-1,-1,-1]\nmax=[0,0,0]\ndensity=0.5\n[[density.shapes]]\nshape=\"sphere\"\ncenter=[0.1,0,0]\nradius=0.3\ndensity=0\n"),
-    ("mesh", "extinction=[2,2,2]\nalbedo=[0,0,1]\n[density]\ntype=\"shapes\"\nshapes=[{shape=\"mesh\",file=\"m.obj\",density=2}]\n"),
-    ("grid", "extinction=[2,2,2]\nalbedo=[0,0,1]\n[density]\ntype=\"grid\"\nfile=\"g.npy\"\nmin=[-1,-1,-1]\nmax=[1,1,1]\n"),
+    (
+        "plain",
+        "extinction = [6.0, 6, 6]\nalbedo = [0.8, 0.8, 0.8]\nphase = { type = \"henyey-greenstein\", g = 0.3 }\nior = 1.3\n",
+    ),
+    (
+        "layers",
+        "extinction=[5,5,7]\nalbedo=[0.9,0.8,0.6]\nphase={type=\"isotropic\"}\n[density]\ntype=\"layers\"\naxis=[0.3,1,0.1]\nperiod=0.25\ndensities=[1.0,0.2]\n",
+    ),
+    (
+        "noise",
+        "extinction=[5,5,7]\nalbedo=[0.9,0.8,0.6]\n[density]\ntype=\"noise\"\nseed=3\nfrequency=2.5\noctaves=4\nrange=[0.2,1.8]\n",
+    ),
+    (
+        "solids",
+        "extinction=[2,2,2]\nalbedo=[0,0,1]\n[density]\ntype=\"shapes\"\nbase=1.0\n[[density.shapes]]\nshape=\"torus\"\ncenter=[0,0,0]\naxis=[0.2,0.3,1]\nradius=0.3\ntube=0.1\ndensity=20.0\nabsorb=true\n[[density.shapes]]\nshape=\"box\"\nmin=[-1,-1,-1]\nmax=[0,0,0]\ndensity=0.5\n[[density.shapes]]\nshape=\"sphere\"\ncenter=[0.1,0,0]\nradius=0.3\ndensity=0\n",
+    ),
+    (
+        "mesh",
+        "extinction=[2,2,2]\nalbedo=[0,0,1]\n[density]\ntype=\"shapes\"\nshapes=[{shape=\"mesh\",file=\"m.obj\",density=2}]\n",
+    ),
+    (
+        "grid",
+        "extinction=[2,2,2]\nalbedo=[0,0,1]\n[density]\ntype=\"grid\"\nfile=\"g.npy\"\nmin=[-1,-1,-1]\nmax=[1,1,1]\n",
+    ),
 ];
 
 const SCENES: [(&str, &str); 2] = [
-    ("lights", "[camera]\nposition=[0,1,4]\ntarget=[0,0,0]\nup=[0,1,0]\nvertical_fov_degrees=30\n[image]\nwidth=40\nheight=32\nsamples_per_pixel=4\n[surface]\nreflection=false\nspecular=0.5\nroughness=0.3\n[[lights]]\ntype=\"point\"\nposition=[3,1,1]\nintensity=[30,20,10]\n[[lights]]\ntype=\"directional\"\ndirection=[0,-1,0]\nirradiance=[1,1,1]\n[[lights]]\ntype=\"spot\"\nposition=[0,2,0]\ndirection=[0,-1,0]\nintensity=[1,1,1]\ninner_degrees=20\nouter_degrees=30\n"),
-    ("environment", "[camera]\nposition=[0,1,4]\ntarget=[0,0,0]\nvertical_fov_degrees=30\n[image]\nwidth=8\nheight=8\n[environment]\nfile=\"e.exr\"\nscale=2\n"),
+    (
+        "lights",
+        "[camera]\nposition=[0,1,4]\ntarget=[0,0,0]\nup=[0,1,0]\nvertical_fov_degrees=30\n[image]\nwidth=40\nheight=32\nsamples_per_pixel=4\n[surface]\nreflection=false\nspecular=0.5\nroughness=0.3\n[[lights]]\ntype=\"point\"\nposition=[3,1,1]\nintensity=[30,20,10]\n[[lights]]\ntype=\"directional\"\ndirection=[0,-1,0]\nirradiance=[1,1,1]\n[[lights]]\ntype=\"spot\"\nposition=[0,2,0]\ndirection=[0,-1,0]\nintensity=[1,1,1]\ninner_degrees=20\nouter_degrees=30\n",
+    ),
+    (
+        "environment",
+        "[camera]\nposition=[0,1,4]\ntarget=[0,0,0]\nvertical_fov_degrees=30\n[image]\nwidth=8\nheight=8\n[environment]\nfile=\"e.exr\"\nscale=2\n",
+    ),
 ];
 
 const LIST: &str = "[defaults]\npreset=\"draft\"\ncache=\"kept\"\n[[bake]]\nmesh=\"a b.obj\"\nmaterial=\"m.toml\"\noutput=\"a.dph\"\nsamples=20000\nno-certificate=true\nlight-error=0.02\n[[bake]]\nmesh=\"-b.obj\"\nmaterial=\"m.toml\"\noutput=\"b.dph\"\nreport=\"r.json\"\n";
 
 const MESHES: [(&str, &str); 5] = [
-    ("good-quads", "o box\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 1 1 1\nv 0 1 1\nvt 0 0\nvn 0 0 1\nusemtl a\nf 4/1/1 3//1 2 1\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf -8 -4 -1 -5\n"),
-    ("good-hole", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nv .3 .3 0\nf 1 3 5\nf 1 5 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"),
-    ("good-two", "g a\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\ng b\nv .1 .1 .1\nv 2 0 0\nv 0 2 0\nv 0 0 2\nf 5 6 7\nf 5 8 6\nf 5 7 8\nf 6 8 7\n"),
-    ("good-strip", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 1\nv 2 1 0\nf 1 2 3\nf 2 4 3\nf 1 2 5\nf 2 1 4\nl 1 2\np 1\n"),
+    (
+        "good-quads",
+        "o box\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 1 1 1\nv 0 1 1\nvt 0 0\nvn 0 0 1\nusemtl a\nf 4/1/1 3//1 2 1\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf -8 -4 -1 -5\n",
+    ),
+    (
+        "good-hole",
+        "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nv .3 .3 0\nf 1 3 5\nf 1 5 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n",
+    ),
+    (
+        "good-two",
+        "g a\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\ng b\nv .1 .1 .1\nv 2 0 0\nv 0 2 0\nv 0 0 2\nf 5 6 7\nf 5 8 6\nf 5 7 8\nf 6 8 7\n",
+    ),
+    (
+        "good-strip",
+        "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 1\nv 2 1 0\nf 1 2 3\nf 2 4 3\nf 1 2 5\nf 2 1 4\nl 1 2\np 1\n",
+    ),
     ("bad-index", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4294967297\n"),
 ];
 
@@ -101,9 +137,8 @@ fn assets() -> Vec<(&'static str, Asset)> {
     let params = hostile::params();
     let plain = baked(THIN, &params);
     let mut nested = baked(&format!("{THIN}ior=1.3\n"), &params);
-    nested.levels = [8, 5, 2]
-        .map(|n| Level { width_factor: 2.0, weight: nested.samples.weight[..n].to_vec() })
-        .to_vec();
+    nested.levels =
+        [8, 5, 2].map(|n| Level { width_factor: 2.0, weight: nested.samples.weight[..n].to_vec() }).to_vec();
     nested.info.provenance.mesh_report.mending = Mending::from_counts([1, 2, 3, 4, 5, 6]);
     let mut varying = plain.clone();
     varying.density = Some(diaphane_formats::asset::DensityGrid {

@@ -4,7 +4,8 @@ use std::fmt::Write;
 
 /// Name and text of each, with about `count` faces.
 pub fn meshes(count: usize) -> Vec<(&'static str, String)> {
-    let unit = |i: usize, k: u64| diaphane_formats::directions::hash(i as u64, k) as f64 / 2f64.powi(64) - 0.5;
+    let unit =
+        |i: usize, k: u64| diaphane_formats::directions::hash(i as u64, k) as f64 / 2f64.powi(64) - 0.5;
     let mut out = Vec::new();
     let mut add = |name, text: String| out.push((name, text));
     let tetrahedron = |text: &mut String, at: [f64; 3], size: f64, i: usize| {
@@ -56,19 +57,51 @@ pub fn meshes(count: usize) -> Vec<(&'static str, String)> {
     let mut text = String::new();
     for i in 0..count {
         let d = [1, 2, 3].map(|k| unit(i, k));
-        writeln!(text, "v {0} {1} {2}\nv -{0} -{1} -{2}\nv {0} {1} 0.1\nf {3} {4} {5}", d[0].abs(), d[1].abs(), d[2].abs(), 3 * i + 1, 3 * i + 2, 3 * i + 3).unwrap();
+        writeln!(
+            text,
+            "v {0} {1} {2}\nv -{0} -{1} -{2}\nv {0} {1} 0.1\nf {3} {4} {5}",
+            d[0].abs(),
+            d[1].abs(),
+            d[2].abs(),
+            3 * i + 1,
+            3 * i + 2,
+            3 * i + 3
+        )
+        .unwrap();
     }
     add("slivers through the middle", text);
     let mut text = String::new();
     for i in 0..count {
         let (x, far) = (i as f64 / count as f64, 1.0 + unit(i, 1));
-        writeln!(text, "v {x} 0 0\nv {} 0 0\nv {x} {far} 1\nf {} {} {}", x + 0.5, 3 * i + 1, 3 * i + 2, 3 * i + 3).unwrap();
+        writeln!(
+            text,
+            "v {x} 0 0\nv {} 0 0\nv {x} {far} 1\nf {} {} {}",
+            x + 0.5,
+            3 * i + 1,
+            3 * i + 2,
+            3 * i + 3
+        )
+        .unwrap();
     }
     add("open edges on one line", text);
     let mut text = String::new();
     for i in 0..count {
         let d = [1, 2, 3].map(|k| 1e-6 * unit(i, k));
-        writeln!(text, "v {} {} {}\nv {} 1 {}\nv 1 {} {}\nf {} {} {}", d[0], d[1], d[2], d[1], d[0], d[2], d[0], 3 * i + 1, 3 * i + 2, 3 * i + 3).unwrap();
+        writeln!(
+            text,
+            "v {} {} {}\nv {} 1 {}\nv 1 {} {}\nf {} {} {}",
+            d[0],
+            d[1],
+            d[2],
+            d[1],
+            d[0],
+            d[2],
+            d[0],
+            3 * i + 1,
+            3 * i + 2,
+            3 * i + 3
+        )
+        .unwrap();
     }
     add("nearly one face", text);
     let mut text = String::new();
@@ -77,7 +110,17 @@ pub fn meshes(count: usize) -> Vec<(&'static str, String)> {
         writeln!(text, "v {} {} 0\nv {} {} 1", a.cos(), a.sin(), a.cos(), a.sin()).unwrap();
     }
     for i in 0..count / 2 {
-        writeln!(text, "f {} {} {}\nf {} {} {}", 2 * i + 1, 2 * i + 3, 2 * i + 2, 2 * i + 3, 2 * i + 4, 2 * i + 2).unwrap();
+        writeln!(
+            text,
+            "f {} {} {}\nf {} {} {}",
+            2 * i + 1,
+            2 * i + 3,
+            2 * i + 2,
+            2 * i + 3,
+            2 * i + 4,
+            2 * i + 2
+        )
+        .unwrap();
     }
     add("a ribbon around and around", text);
     out
