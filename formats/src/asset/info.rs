@@ -113,7 +113,7 @@ impl Info {
         }
         let [low, high] = self.bounds.map(Vec3::from);
         let diagonal = self.diagonal();
-        if !low.cmple(high).all() || !(diagonal.is_finite() && diagonal > 0.0) {
+        if !(low.cmple(high).all() && diagonal.is_finite() && diagonal > 0.0) {
             return fail("bounding box");
         }
         let (extinction, albedo) = (DVec3::from(self.extinction), DVec3::from(self.albedo));
