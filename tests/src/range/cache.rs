@@ -97,7 +97,7 @@ impl Subject<'_> {
 fn read([exr, json]: &[PathBuf; 2], scene: &Scene) -> Result<Reference> {
     let facts: Facts = serde_json::from_str(&files::read_text(json)?)
         .map_err(|e| Error::file(json, format!("is damaged: {e}")))?;
-    let bytes = files::read(exr, files::Kind::Exr)?;
+    let bytes = files::read(exr, files::Kind::Kept)?;
     if blake3::hash(&bytes).to_hex().as_str() != facts.picture {
         return Err(Error::file(exr, "is damaged: its checksum is another one"));
     }
