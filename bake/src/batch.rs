@@ -3,14 +3,14 @@
 use crate::cli::{self, Arguments};
 use crate::inspect::percent;
 use crate::terminal::Bars;
-use anyhow::{Context, bail, ensure};
+use anyhow::{Context, bail};
 use clap::Parser;
+use diaphane_bake::list;
 use diaphane_bake::progress::Progress;
 use diaphane_bake::report::Report;
 use diaphane_formats::{files, one_line};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
-use toml::{Table, Value};
 
 /// What to bake.
 #[derive(clap::Args)]
@@ -43,16 +43,12 @@ pub struct SomeFailed {
     all: usize,
 }
 
-/// Options that hold for the whole program.
-const WHOLE: [&str; 2] = ["threads", "quiet"];
-
 /// Bakes the list, one after the other; a failure does not stop the rest.
 pub fn run(arguments: &BatchArguments) -> anyhow::Result<()> {
     let folder = arguments.list.parent().unwrap_or(Path::new(""));
-    let text = String::from_utf8(files::read(&arguments.list)?)
-        .map_err(|_| anyhow::anyhow!("'{}' is not text", arguments.list.display()))?;
+    let text = files::read_text(&arguments.list)?;
     let name = arguments.list.display();
-    let lines = command_lines(&text, folder).with_context(|| format!("'{name}'"))?;
+    let lines = list::command_lines(&text, folder).with_context(|| format!("'{name}'"))?;
     if arguments.commands {
         lines.iter().for_each(|line| println!("{}", shell(line)));
         return Ok(());
@@ -111,64 +107,6 @@ fn line(output: &Path, result: &anyhow::Result<Report>, seconds: f64) -> String 
     }
 }
 
-/// Program and arguments of every bake in the list.
-fn command_lines(text: &str, folder: &Path) -> anyhow::Result<Vec<Vec<String>>> {
-    let mut list: Table = text.parse().map_err(|e: toml::de::Error| anyhow::anyhow!("{}", e.message()))?;
-    let defaults = match list.remove("defaults") {
-        None => Table::new(),
-        Some(Value::Table(table)) => table,
-        Some(_) => bail!("'defaults' must be a table"),
-    };
-    let Some(Value::Array(bakes)) = list.remove("bake") else {
-        bail!("holds no [[bake]]; see diaphane-bake batch --help");
-    };
-    if let Some(key) = list.keys().next() {
-        bail!("'{key}' is no part of a list; there are [defaults] and [[bake]]");
-    }
-    ensure!(!bakes.is_empty(), "holds no [[bake]]; see diaphane-bake batch --help");
-    bakes
-        .into_iter()
-        .enumerate()
-        .map(|(i, bake)| {
-            let Value::Table(bake) = bake else { bail!("bake {} is not a table", i + 1) };
-            let mut options = defaults.clone();
-            options.extend(bake);
-            command_line(options, folder).with_context(|| format!("bake {}", i + 1))
-        })
-        .collect()
-}
-
-fn command_line(mut options: Table, folder: &Path) -> anyhow::Result<Vec<String>> {
-    let mut path = |key: &str| match options.remove(key) {
-        Some(Value::String(path)) => Ok(Some(folder.join(path).to_string_lossy().into_owned())),
-        Some(_) => bail!("'{key}' must be a path in quotes"),
-        None => Ok(None),
-    };
-    let mut line = vec!["diaphane-bake".to_owned()];
-    for key in ["mesh", "material", "output", "report", "cache"] {
-        let Some(path) = path(key)? else {
-            ensure!(["report", "cache"].contains(&key), "'{key}' is missing");
-            continue;
-        };
-        line.extend((key != "mesh").then(|| format!("--{key}")));
-        line.push(path);
-    }
-    for (key, value) in options {
-        ensure!(!WHOLE.contains(&key.as_str()), "'{key}' holds for a whole batch: give --{key} to it");
-        let value = match value {
-            Value::Boolean(true) => None,
-            Value::Boolean(false) => continue,
-            Value::String(s) => Some(s),
-            Value::Integer(i) => Some(i.to_string()),
-            Value::Float(f) => Some(f.to_string()),
-            _ => bail!("'{key}' must be a number, a text or true"),
-        };
-        line.push(format!("--{key}"));
-        line.extend(value);
-    }
-    Ok(line)
-}
-
 /// A command line that a shell takes apart as it was.
 fn shell(line: &[String]) -> String {
     let plain = |c: char| c.is_ascii_alphanumeric() || "-_./=,:+@%".contains(c);
@@ -184,7 +122,7 @@ mod tests {
     use super::*;
 
     fn lines(text: &str) -> anyhow::Result<Vec<String>> {
-        Ok(command_lines(text, Path::new("in"))?.iter().map(|line| shell(line)).collect())
+        Ok(list::command_lines(text, Path::new("in"))?.iter().map(|line| shell(line)).collect())
     }
 
     #[test]
@@ -214,6 +152,10 @@ mod tests {
             (&format!("{bake}output = \"o\"\nseed = [1]"), "'seed' must be"),
             (&format!("extra = 1\n{bake}output = \"o\""), "'extra' is no part"),
             ("[[bake", "expected"),
+            (
+                &format!("[defaults]\nreport = \"{}\"\n{bake}output = \"o\"", "r".repeat(9000)),
+                "'defaults' is longer",
+            ),
         ] {
             let error = format!("{:#}", lines(text).unwrap_err());
             assert!(error.contains(part), "{text}: {error}");

@@ -8,7 +8,7 @@ use std::path::Path;
 
 /// Prints what is in an asset.
 pub fn show(path: &Path, as_json: bool) -> anyhow::Result<()> {
-    let bytes = files::read(path)?;
+    let bytes = files::read(path, files::Kind::Asset)?;
     let in_file = |e: diaphane_formats::Error| e.in_file(path);
     let asset = asset::parse(&bytes).map_err(in_file)?;
     let sections = asset::section_sizes(&bytes).map_err(in_file)?;

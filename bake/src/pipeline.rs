@@ -8,6 +8,7 @@ use crate::cache::{Cache, Key};
 use crate::certificate::{self, Measured};
 use crate::field::{DistanceGrid, Shape, grid_cells};
 use crate::fit::{self, FirstFits, Fits, Light, Lit};
+use crate::levels::Nested;
 use crate::measure::exact::means;
 use crate::pack::{self, Stand};
 use crate::params::{DENSITY_DIRECTIONS, Params, Visibility};
@@ -17,12 +18,13 @@ use crate::report::{Facts, Refinement, Report};
 use crate::samples::{Candidate, Ground, Placed};
 use crate::{Error, Input, Prepared, Result, blocks, density, layers, levels, samples};
 use diaphane_formats::asset::Asset;
+use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use std::cell::OnceCell;
 
 /// Where samples stand.
 #[derive(Serialize, Deserialize)]
-struct Placing {
+pub(crate) struct Placing {
     placed: Placed,
     /// Of the kernels, in disk radii.
     width_factor: f32,
@@ -36,7 +38,7 @@ struct Placing {
 
 /// What the samples carry.
 #[derive(Serialize, Deserialize)]
-struct Lighting {
+pub(crate) struct Lighting {
     /// Which samples stay; all that follows is of those alone.
     keep: Vec<bool>,
     light: Light,
@@ -55,6 +57,27 @@ pub(crate) struct Pipeline<'a> {
     timed: &'a Timed<'a>,
     shape: OnceCell<Shape<'a>>,
     medium: OnceCell<Prepared<'a>>,
+}
+
+impl Placing {
+    /// Whether one read from a cache can be that of any bake.
+    pub fn fits(&self) -> bool {
+        self.placed.fits() && self.width_factor > 0.0 && self.width_factor.is_finite()
+    }
+}
+
+impl Lighting {
+    /// Whether one read from a cache can be that of `samples` samples with so many held-out lights.
+    pub fn fits(&self, samples: usize, matched: bool, held_out: usize, params: &Params) -> bool {
+        let kept = self.keep.iter().filter(|k| **k).count();
+        let whole = |light: &Vec<f32>| light.len() == kept && light.iter().all(|v| v.is_finite());
+        self.keep.len() == samples
+            && kept > 0
+            && self.offset.len() == kept
+            && self.light.fits(kept, matched, params)
+            && self.exact.len() == held_out
+            && self.exact.iter().all(whole)
+    }
 }
 
 /// Names of results.
@@ -93,14 +116,17 @@ impl<'a> Pipeline<'a> {
     /// Runs what no cache holds.
     pub fn run(&self) -> Result<(Asset, Report)> {
         let keys = Keys::new(self.input, self.params)?;
-        let placing = self.cache.get(&keys.placing, || self.place())?;
+        let placing = self.cache.get(&keys.placing, Placing::fits, || self.place())?;
         let params = Params { width_factor: placing.width_factor, ..self.params.clone() };
         let placed = &placing.placed;
-        let lighting = self.cache.get(&keys.lighting, || self.light(&keys, &placed.samples))?;
+        let (matched, held_out) = (self.input.medium.ior() == 1.0, self.held_out().len());
+        let fits = |l: &Lighting| l.fits(placed.samples.len(), matched, held_out, self.params);
+        let lighting = self.cache.get(&keys.lighting, fits, || self.light(&keys, &placed.samples))?;
         let samples: Vec<Candidate> = kept(&placed.samples, &lighting.keep);
         let discarded = placed.samples.len() - samples.len();
         let nested = Key::new("weights", &(&keys.depths, placing.width_factor))?;
-        let nested = self.cache.get(&nested, || {
+        let fits = |n: &Nested| n.fits(samples.len());
+        let nested = self.cache.get(&nested, fits, || {
             levels::nest(self.input.mesh, &samples, &placed.probes, params.width_factor, self.timed)
         })?;
         let samples = nested.arranged(&samples);
@@ -114,7 +140,8 @@ impl<'a> Pipeline<'a> {
         })?;
         if params.certificate {
             let key = Key::new("certificate", &(&keys.lighting, placing.width_factor))?;
-            let measured = self.cache.get(&key, || self.measure(&exact, &asset))?;
+            let fits = |m: &Measured| m.fits(params.seed);
+            let measured = self.cache.get(&key, fits, || self.measure(&exact, &asset))?;
             let (certificate, errors) = measured.certificate(self.input.medium);
             asset.info.certificate = Some(certificate);
             asset.levels.iter_mut().zip(errors).for_each(|(level, error)| level.error = error);
@@ -166,8 +193,8 @@ impl<'a> Pipeline<'a> {
             "distance field",
             &(shape.mesh.content_hash(), self.input.mesh_report.is_mended(), cells),
         )?;
-        let grid =
-            self.cache.get(&key, || timed.stage("distance field", |p| DistanceGrid::new(shape, cells, p)))?;
+        let make = || timed.stage("distance field", |p| DistanceGrid::new(shape, cells, p));
+        let grid = self.cache.get(&key, DistanceGrid::fits, make)?;
         let skipped = grid.skipped;
         let (layers, dark_layers) =
             timed.stage("layers", |p| layers::build(shape, &grid, medium.medium, params.placement, p))?;
@@ -191,7 +218,9 @@ impl<'a> Pipeline<'a> {
     fn light(&self, keys: &Keys, samples: &[Candidate]) -> Result<Lighting> {
         let (params, timed) = (self.params, self.timed);
         let ranges = blocks::ranges(samples.len());
-        let exact = if params.certificate { certificate::exact_lights(params.seed) } else { Vec::new() };
+        let exact = self.held_out();
+        let matched = self.input.medium.ior() == 1.0;
+        let directions = params.directions.next_multiple_of(2);
         // Work is announced when the first block turns out not to be in the cache.
         let (mut depths_announced, mut fits_announced) = (false, false);
         let method = self.method(samples.len());
@@ -202,7 +231,8 @@ impl<'a> Pipeline<'a> {
             let own = &samples[range.clone()];
             let block = (b, ranges.len());
             let key = Key::new(keys.depths.stage(), &(&keys.depths, block))?;
-            let lit: Lit = self.cache.get(&key, || {
+            let fits = |l: &Lit| l.fits(own.len(), directions, matched, exact.len());
+            let lit = self.cache.get(&key, fits, || {
                 let (shape, medium) = (self.shape()?, self.medium()?);
                 let task = timed.stage("cells", |_| fit::Task::new(shape, medium, own, b, params))?;
                 if !std::mem::replace(&mut depths_announced, true) {
@@ -218,19 +248,27 @@ impl<'a> Pipeline<'a> {
                 }
                 Ok(lit)
             })?;
-            let first: FirstFits =
-                self.cache.get(&Key::new(keys.first.stage(), &(&keys.first, block))?, || {
-                    let encoding = all.as_ref().map(|fits| fits.encoding);
-                    if !std::mem::replace(&mut fits_announced, true) {
-                        timed.announce("harmonics", samples.len() - range.start);
-                    }
-                    timed.stage("harmonics", |p| fit::first_fits(&lit, encoding, params, p))
-                })?;
+            let lit_samples = lit.surface.len();
+            let key = Key::new(keys.first.stage(), &(&keys.first, block))?;
+            let encoding = all.as_ref().map(|fits| fits.encoding);
+            let fits = |f: &FirstFits| {
+                f.fits(lit_samples, params) && encoding.is_none_or(|encoding| encoding == f.encoding)
+            };
+            let first = self.cache.get(&key, fits, || {
+                if !std::mem::replace(&mut fits_announced, true) {
+                    timed.announce("harmonics", samples.len() - range.start);
+                }
+                timed.stage("harmonics", |p| fit::first_fits(&lit, encoding, params, p))
+            })?;
+            let encoding = first.encoding;
             let make = || timed.stage("more bands", |p| fit::fits(&lit, first, params, p));
             // The light of a single block is kept as a whole.
             let fits = match ranges.len() {
                 1 => make()?,
-                _ => self.cache.get(&Key::new("more bands", &(&keys.lighting, block))?, make)?,
+                _ => {
+                    let fits = |f: &Fits| f.encoding == encoding && f.fits(lit_samples, matched, params);
+                    self.cache.get(&Key::new("more bands", &(&keys.lighting, block))?, fits, make)?
+                }
             };
             match &mut all {
                 Some(all) => all.append(fits),
@@ -246,6 +284,11 @@ impl<'a> Pipeline<'a> {
         let all = lit.ok_or_else(|| Error::NoRoom("no light reaches its inside".to_owned()))?;
         let light = timed.stage("rounding", |p| fit::quantised(all, params, p))?;
         Ok(Lighting { keep, light, offset, exact: arriving, buried, dark })
+    }
+
+    /// The lights whose exact means over cells the certificate plays too.
+    fn held_out(&self) -> Vec<(DVec3, usize)> {
+        if self.params.certificate { certificate::exact_lights(self.params.seed) } else { Vec::new() }
     }
 
     fn measure(&self, exact: &[Vec<f32>], asset: &Asset) -> Result<Measured> {

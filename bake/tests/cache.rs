@@ -178,3 +178,35 @@ fn damaged_entries_are_made_again_and_said_so() {
     let (_, report) = run(&medium, &params, &Silent).unwrap();
     assert!(report.cache.unwrap().problems.is_empty());
 }
+
+#[test]
+fn entries_of_another_bake_are_made_again_and_said_so() {
+    let (ours, theirs) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let medium = medium(0.8, 5.0);
+    let params = small(Some(ours.path()));
+    let (whole, _) = run(&medium, &params, &Silent).unwrap();
+    let other = Params { samples: 400, order: 3, cache: Some(theirs.path().to_owned()), ..params.clone() };
+    run(&medium, &other, &Silent).unwrap();
+    // Each under the name of ours, its checksum right.
+    let stage =
+        |path: &Path| path.file_name().unwrap().to_string_lossy().rsplit_once('-').unwrap().0.to_owned();
+    let files = |folder: &Path| -> Vec<_> {
+        std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect()
+    };
+    let mut swapped = 0;
+    for entry in
+        files(ours.path()).iter().filter(|entry| !["samples", "certificate"].contains(&stage(entry).as_str()))
+    {
+        let others = files(theirs.path());
+        std::fs::copy(others.iter().find(|o| stage(o) == stage(entry)).unwrap(), entry).unwrap();
+        swapped += 1;
+    }
+    assert!(swapped > 3);
+    let (again, report) = run(&medium, &params, &Silent).unwrap();
+    assert!(again == whole);
+    let problems = report.cache.unwrap().problems;
+    assert!(
+        problems.len() > 2 && problems.iter().all(|p| p.contains("belongs to another bake")),
+        "{problems:?}"
+    );
+}

@@ -1,36 +1,105 @@
-//! Opening and writing files: only regular files are read, and a file appears under its name only when complete.
+//! Opening and writing files: only regular files of the expected kind and size are read, and a file appears under its
+//! name only when complete.
 
 use crate::{Error, Result};
-use std::fs::TryLockError;
+use std::fs::{File, Metadata, TryLockError};
 use std::io::{Read, Write};
 use std::path::Path;
 use std::time::Duration;
 use tempfile::NamedTempFile;
 
-/// Reads a whole regular file. Anything else (folder, device, pipe) is refused, so that a path from a file of a
-/// stranger cannot block or flood the program.
-pub fn read(path: &Path) -> Result<Vec<u8>> {
-    require_regular(path)?;
-    std::fs::read(path).map_err(|e| Error::io("read", path, e))
+/// What a file is opened for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// A material, a scene, a list of bakes.
+    Text,
+    /// An OBJ mesh.
+    Mesh,
+    /// An array of NumPy.
+    Npy,
+    /// An EXR picture.
+    Exr,
+    /// A baked asset.
+    Asset,
+    /// What this program kept for itself: results of stages, measurements.
+    Kept,
+}
+
+impl Kind {
+    /// Its first bytes, as far as they are always the same.
+    fn magic(self) -> &'static [u8] {
+        match self {
+            Self::Npy => crate::npy::MAGIC,
+            Self::Exr => crate::picture::EXR_MAGIC,
+            Self::Asset => crate::asset::MAGIC,
+            Self::Text | Self::Mesh | Self::Kept => b"",
+        }
+    }
+
+    /// Bytes at the most: far above what makes sense, far below what a file without data can claim.
+    fn most(self) -> u64 {
+        match self {
+            Self::Text => 16 << 20,
+            Self::Mesh | Self::Exr => 4 << 30,
+            Self::Npy | Self::Asset | Self::Kept => 16 << 30,
+        }
+    }
+
+    fn complaint(self) -> &'static str {
+        match self {
+            Self::Npy => "is not a usable .npy file: it does not begin like one",
+            Self::Exr => "is not a usable EXR picture: it does not begin like one",
+            Self::Asset => "is not a diaphane asset",
+            Self::Text | Self::Mesh | Self::Kept => "is of another kind",
+        }
+    }
+}
+
+/// Reads a whole regular file. Anything else (folder, device, pipe) is refused, and so is what does not begin like a
+/// file of its kind or is too large for one, so that a path from a file of a stranger cannot block or flood the program.
+pub fn read(path: &Path, kind: Kind) -> Result<Vec<u8>> {
+    read_up_to(path, kind, u64::MAX)
 }
 
 /// Reads the first `length` bytes of a regular file, fewer where it has no more.
-pub fn read_front(path: &Path, length: usize) -> Result<Vec<u8>> {
-    require_regular(path)?;
-    let fail = |e| Error::io("read", path, e);
-    let file = std::fs::File::open(path).map_err(fail)?;
-    let mut front = Vec::new();
-    file.take(length as u64).read_to_end(&mut front).map_err(fail)?;
-    Ok(front)
+pub fn read_front(path: &Path, kind: Kind, length: usize) -> Result<Vec<u8>> {
+    read_up_to(path, kind, length as u64)
 }
 
 /// Reads a whole regular file as UTF-8 text.
 pub fn read_text(path: &Path) -> Result<String> {
-    String::from_utf8(read(path)?).map_err(|_| Error::file(path, "is not a text file (invalid UTF-8)"))
+    String::from_utf8(read(path, Kind::Text)?)
+        .map_err(|_| Error::file(path, "is not a text file (invalid UTF-8)"))
 }
 
-fn require_regular(path: &Path) -> Result<()> {
-    let about = std::fs::metadata(path).map_err(|e| Error::io("read", path, e))?;
+fn read_up_to(path: &Path, kind: Kind, wanted: u64) -> Result<Vec<u8>> {
+    let fail = |e| Error::io("read", path, e);
+    // Looked at before it is opened: opening a pipe waits for its other end, opening a device may do anything.
+    require_regular(path, &std::fs::metadata(path).map_err(fail)?)?;
+    let file = File::open(path).map_err(fail)?;
+    // Something else may have taken the name meanwhile.
+    let about = file.metadata().map_err(fail)?;
+    require_regular(path, &about)?;
+    let (length, most) = (about.len(), kind.most());
+    if length > most {
+        let message = format!("has {length} bytes; a file of its kind has at most {most}");
+        return Err(Error::file(path, message));
+    }
+    let magic = kind.magic();
+    let mut bytes = Vec::new();
+    (&file).take(magic.len() as u64).read_to_end(&mut bytes).map_err(fail)?;
+    if bytes != magic {
+        return Err(Error::file(path, kind.complaint()));
+    }
+    // No more than the file was said to have: one that grows or never ends is not followed.
+    let rest = length.min(wanted).saturating_sub(magic.len() as u64);
+    let reserved = usize::try_from(rest).ok().and_then(|rest| bytes.try_reserve_exact(rest).ok());
+    reserved.ok_or_else(|| Error::file(path, format!("has {length} bytes, more than memory holds")))?;
+    file.take(rest).read_to_end(&mut bytes).map_err(fail)?;
+    Ok(bytes)
+}
+
+fn require_regular(path: &Path, about: &Metadata) -> Result<()> {
     if about.is_file() { Ok(()) } else { Err(Error::file(path, "is not a regular file")) }
 }
 
@@ -146,6 +215,7 @@ fn parent(path: &Path) -> &Path {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::time::Instant;
 
     /// Names in a folder.
     fn names(folder: &Path) -> Vec<String> {
@@ -211,8 +281,68 @@ mod tests {
                 remove_unfinished(&path);
             }
         });
-        let bytes = read(&path).unwrap();
+        let bytes = read(&path, Kind::Kept).unwrap();
         assert!(bytes.len() == 1000 && bytes.iter().all(|b| *b == bytes[0]));
         assert_eq!(names(folder.path()), ["a.dph"]);
+    }
+
+    const KINDS: [Kind; 6] = [Kind::Text, Kind::Mesh, Kind::Npy, Kind::Exr, Kind::Asset, Kind::Kept];
+
+    fn message(path: &Path, kind: Kind) -> String {
+        let started = Instant::now();
+        let message = read(path, kind).unwrap_err().to_string();
+        assert!(started.elapsed() < Duration::from_secs(1), "{message}");
+        message
+    }
+
+    #[test]
+    fn whole_files_and_their_fronts_are_read() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a");
+        for kind in KINDS {
+            let whole = [kind.magic(), b"and more"].concat();
+            std::fs::write(&path, &whole).unwrap();
+            assert_eq!(read(&path, kind).unwrap(), whole);
+            let magic = kind.magic().len();
+            assert_eq!(read_front(&path, kind, magic + 3).unwrap(), whole[..magic + 3]);
+            assert_eq!(read_front(&path, kind, 1 << 40).unwrap(), whole);
+        }
+    }
+
+    #[test]
+    fn files_of_another_kind_are_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a");
+        std::fs::write(&path, "v 0 0 0\n").unwrap();
+        assert!(message(&path, Kind::Exr).contains("EXR"));
+        assert!(message(&path, Kind::Npy).contains(".npy"));
+        assert!(message(&path, Kind::Asset).contains("not a diaphane asset"));
+        assert!(message(folder.path(), Kind::Text).contains("not a regular file"));
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn devices_and_pipes_are_refused_and_not_waited_for() {
+        for device in ["/dev/zero", "/dev/stdin", "/dev/tty"].map(Path::new) {
+            if device.exists() && !device.is_file() {
+                KINDS.iter().for_each(|kind| assert!(message(device, *kind).contains("not a regular file")));
+            }
+        }
+        let folder = tempfile::tempdir().unwrap();
+        let pipe = folder.path().join("pipe");
+        assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+        KINDS.iter().for_each(|kind| assert!(message(&pipe, *kind).contains("not a regular file")));
+        let link = folder.path().join("link");
+        std::os::unix::fs::symlink("/dev/zero", &link).unwrap();
+        assert!(message(&link, Kind::Mesh).contains("not a regular file"));
+    }
+
+    #[test]
+    fn what_is_far_too_large_is_refused_unread() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a");
+        // Without data on the disk.
+        File::create(&path).unwrap().set_len(100 << 30).unwrap();
+        KINDS.iter().for_each(|kind| assert!(message(&path, *kind).contains("at most")));
     }
 }

@@ -26,6 +26,7 @@ pub mod material;
 pub mod medium;
 pub mod mesh;
 pub mod morton;
+mod npy;
 pub mod phase;
 pub mod picture;
 pub mod reconstruct;
@@ -35,4 +36,4 @@ pub mod slopes;
 mod toml_keys;
 pub mod visibility;
 
-pub use error::{Error, Result, one_line};
+pub use error::{Error, Result, one_line, plain};

@@ -7,7 +7,10 @@ use crate::toml_keys::{Reader, parse, type_of, unknown_type};
 use crate::visibility::Accel;
 use crate::{Error, Result, files};
 use std::path::Path;
-use toml::Table;
+use toml::{Table, Value};
+
+/// Meshes that a material may name: each line of it may cost as much as the largest mesh.
+const MOST_MESHES: usize = 64;
 
 /// Reads a material file and the files that it names (relative to its own folder).
 ///
@@ -56,28 +59,23 @@ fn parse_density(table: &Table, folder: &Path) -> Result<Density> {
         "layers" => {
             let r = Reader::new(table, PLACE, &["type", "axis", "period", "densities"])?;
             let densities = r.numbers("densities")?.unwrap_or_default();
-            let period = r.required_number("period")?;
+            let period = r.required_size("period")?;
             if densities.is_empty() || densities.len() > 64 || densities.iter().any(|d| *d < 0.0) {
                 return Err(Error::invalid(
                     "'density.densities' must list 1 to 64 values that are not negative",
                 ));
             }
-            if period <= 0.0 {
-                return Err(Error::invalid("'density.period' must be above 0"));
-            }
             Ok(Density::Layers(Layers { axis: r.required_direction("axis")?, period, densities }))
         }
         "noise" => {
             let r = Reader::new(table, PLACE, &["type", "seed", "frequency", "octaves", "range"])?;
-            let frequency = r.required_number("frequency")?;
+            let frequency = r.required_size("frequency")?;
             let range = r.numbers("range")?.unwrap_or(vec![0.0, 1.0]);
             let [low, high] = range[..] else {
                 return Err(Error::invalid("'density.range' must be a list of two numbers"));
             };
-            if frequency <= 0.0 || low < 0.0 || high < low {
-                return Err(Error::invalid(
-                    "'density': frequency must be above 0 and range 0 <= low <= high",
-                ));
+            if low < 0.0 || high < low {
+                return Err(Error::invalid("'density.range' must hold 0 <= low <= high"));
             }
             let seed = r.integer("seed", 0..=i64::MAX)?.unwrap_or(0) as u64;
             let octaves = r.integer("octaves", 1..=12)?.unwrap_or(1) as u32;
@@ -89,8 +87,14 @@ fn parse_density(table: &Table, folder: &Path) -> Result<Density> {
             if base < 0.0 {
                 return Err(Error::invalid("'density.base' must not be negative"));
             }
-            let shapes =
-                r.tables("shapes")?.into_iter().map(|t| parse_shape(t, folder)).collect::<Result<_>>()?;
+            let tables = r.tables("shapes")?;
+            let meshes = tables.iter().filter(|t| t.get("shape").and_then(Value::as_str) == Some("mesh"));
+            if meshes.count() > MOST_MESHES {
+                return Err(Error::invalid(format!(
+                    "'density.shapes' names more than {MOST_MESHES} meshes; join them in one file"
+                )));
+            }
+            let shapes = tables.into_iter().map(|t| parse_shape(t, folder)).collect::<Result<_>>()?;
             Ok(Density::Shapes(Shapes { base, shapes }))
         }
         other => Err(unknown_type(PLACE, other, &["grid", "layers", "noise", "shapes"])),
@@ -113,12 +117,10 @@ fn parse_shape(table: &Table, folder: &Path) -> Result<Shape> {
         }
     });
     let r = Reader::new(table, PLACE, &known)?;
-    let above_zero = |key: &str| {
-        let value = r.required_number(key)?;
-        if value > 0.0 { Ok(value) } else { Err(Error::invalid(format!("'{PLACE}.{key}' must be above 0"))) }
-    };
     let solid = match kind {
-        "sphere" => Solid::Sphere { center: r.required_vector("center")?, radius: above_zero("radius")? },
+        "sphere" => {
+            Solid::Sphere { center: r.required_vector("center")?, radius: r.required_size("radius")? }
+        }
         "box" => {
             let (min, max) = (r.required_vector("min")?, r.required_vector("max")?);
             if !min.cmplt(max).all() {
@@ -129,8 +131,8 @@ fn parse_shape(table: &Table, folder: &Path) -> Result<Shape> {
         "torus" => Solid::Torus {
             center: r.required_vector("center")?,
             axis: r.required_direction("axis")?,
-            radius: above_zero("radius")?,
-            tube: above_zero("tube")?,
+            radius: r.required_size("radius")?,
+            tube: r.required_size("tube")?,
         },
         _ => {
             let (mesh, _) = load_obj(&folder.join(r.required_text("file")?))?;

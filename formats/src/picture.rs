@@ -1,8 +1,12 @@
 //! Pictures of linear radiance: EXR in and out, PNG to look at, coverage masks.
 
-use crate::{Error, Result, files, medium};
+use crate::npy::{self, Stored};
+use crate::{Error, Result, files};
 use std::io::Cursor;
 use std::path::Path;
+
+/// How every EXR file begins.
+pub(crate) const EXR_MAGIC: &[u8] = &[0x76, 0x2f, 0x31, 0x01];
 
 /// Linear RGB, row 0 on top, with an optional coverage (0..1) per pixel.
 #[derive(Clone, Debug, PartialEq)]
@@ -29,20 +33,19 @@ impl Picture {
 /// # Errors
 /// Unreadable file, not an EXR, missing channels, size that its bytes cannot back.
 pub fn read_exr(path: &Path) -> Result<Picture> {
-    parse_exr(&files::read(path)?).map_err(|e| e.in_file(path))
+    parse_exr(&files::read(path, files::Kind::Exr)?).map_err(|e| e.in_file(path))
 }
 
 /// As [`read_exr`], from the file's bytes.
+///
+/// # Errors
+/// As [`read_exr`].
 pub fn parse_exr(bytes: &[u8]) -> Result<Picture> {
     use exr::prelude::*;
-    let bad = |e: String| crate::Error::invalid(format!("is not a usable EXR picture: {e}"));
-    // A header can promise any size; what compression can unfold is bounded by 1:1000 or so.
-    let meta = MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(|e| bad(e.to_string()))?;
-    let budget = bytes.len().saturating_mul(4096).max(1 << 20);
+    let bad = |e: &str| crate::Error::invalid(format!("is not a usable EXR picture: {e}"));
+    let meta = MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(|e| bad(&e.to_string()))?;
     for header in &meta.headers {
-        if header.max_pixel_file_bytes() > budget {
-            return Err(bad("its header promises more pixels than the file can hold".to_owned()));
-        }
+        check_promises(header, bytes.len()).map_err(bad)?;
     }
     let image = read()
         .no_deep_data()
@@ -52,29 +55,58 @@ pub fn parse_exr(bytes: &[u8]) -> Result<Picture> {
         .all_attributes()
         .non_parallel()
         .from_buffered(Cursor::new(bytes))
-        .map_err(|e| bad(e.to_string()))?;
+        .map_err(|e| bad(&e.to_string()))?;
     let size = image.layer_data.size;
+    let count = size.width() * size.height();
     let channels = &image.layer_data.channel_data.list;
     let find = |name: &str| channels.iter().find(|c| c.name.to_string().eq_ignore_ascii_case(name));
-    let values =
-        |channel: &AnyChannel<FlatSamples>| -> Vec<f32> { channel.sample_data.values_as_f32().collect() };
-    let rgb = match (find("R"), find("G"), find("B")) {
-        (Some(r), Some(g), Some(b)) => [values(r), values(g), values(b)],
+    let [r, g, b] = match (find("R"), find("G"), find("B")) {
+        (Some(r), Some(g), Some(b)) => [r, g, b],
         _ => match channels.iter().find(|c| !c.name.to_string().eq_ignore_ascii_case("A")) {
-            Some(grey) => [values(grey), values(grey), values(grey)],
-            None => return Err(bad("it has no colour channel".to_owned())),
+            Some(grey) => [grey; 3],
+            None => return Err(bad("it has no colour channel")),
         },
     };
-    let count = size.width() * size.height();
-    if rgb.iter().any(|c| c.len() != count) {
-        return Err(bad("its channels are subsampled".to_owned()));
+    let alpha = find("A");
+    if [r, g, b].into_iter().chain(alpha).any(|c| c.sample_data.len() != count) {
+        return Err(bad("its channels are subsampled"));
     }
-    Ok(Picture {
-        width: size.width(),
-        height: size.height(),
-        pixels: (0..count).map(|i| [rgb[0][i], rgb[1][i], rgb[2][i]]).collect(),
-        coverage: find("A").map(values),
-    })
+    let [r, g, b] = [r, g, b].map(|c| c.sample_data.values_as_f32());
+    let pixels = r.zip(g).zip(b).map(|((r, g), b)| [r, g, b]).collect();
+    let coverage = alpha.map(|alpha| alpha.sample_data.values_as_f32().collect());
+    Ok(Picture { width: size.width(), height: size.height(), pixels, coverage })
+}
+
+/// Bytes that one compressed byte unfolds to at the most: Deflate's longest match of 258 bytes in two bits, and a third
+/// more where PXR24 adds the lowest byte of every float.
+const MOST_UNFOLDED: u128 = 1032 * 4 / 3;
+/// Sides of a tile at the most.
+const MOST_TILE: usize = 1 << 14;
+
+/// A header can promise any size, and memory for it is taken before its data are read: refuses promises that a file of
+/// `length` bytes cannot keep.
+fn check_promises(
+    header: &exr::meta::header::Header,
+    length: usize,
+) -> std::result::Result<(), &'static str> {
+    use exr::meta::BlockDescription;
+    if header.deep {
+        return Err("it holds deep data");
+    }
+    if let BlockDescription::Tiles(tiles) = header.blocks
+        && tiles.tile_size.width().max(tiles.tile_size.height()) > MOST_TILE
+    {
+        return Err("its tiles are too large");
+    }
+    let area = header.layer_size.width() as u128 * header.layer_size.height() as u128;
+    let channels = header.channels.list.iter();
+    let bytes: u128 = channels.map(|c| area * c.sample_type.bytes_per_sample() as u128).sum();
+    let chunks = 8 * header.chunk_count as u128;
+    let length = length as u128;
+    if chunks > length || bytes > length * MOST_UNFOLDED {
+        return Err("its header promises more pixels than the file can hold");
+    }
+    Ok(())
 }
 
 /// Writes an EXR file with 32-bit floats; coverage goes to alpha.
@@ -178,20 +210,33 @@ pub fn write_png(path: &Path, picture: &Picture, display: Display) -> Result<()>
 /// # Errors
 /// Unreadable file, wrong type or dimensions.
 pub fn read_coverage(path: &Path) -> Result<(usize, usize, Vec<f32>)> {
-    if path.extension().and_then(|e| e.to_str()) == Some("npy") {
-        let bytes = files::read(path)?;
-        let (shape, kind, mut values) = medium::read_npy(&bytes).map_err(|e| e.in_file(path))?;
-        let [height, width] = shape[..] else {
-            return Err(Error::file(path, "a coverage mask has two dimensions (rows, columns)"));
-        };
-        if kind == medium::NpyKind::Bytes {
-            values.iter_mut().for_each(|v| *v /= 255.0);
-        }
-        return Ok((width, height, values));
+    let mask = if path.extension().and_then(|e| e.to_str()) == Some("npy") {
+        parse_coverage_npy(&files::read(path, files::Kind::Npy)?).map_err(|e| e.in_file(path))?
+    } else {
+        let picture = read_exr(path)?;
+        let values = picture.coverage.unwrap_or_else(|| picture.pixels.iter().map(|p| p[0]).collect());
+        (picture.width, picture.height, values)
+    };
+    if mask.2.iter().all(|v| v.is_finite()) {
+        Ok(mask)
+    } else {
+        Err(Error::file(path, "holds values that are not finite"))
     }
-    let picture = read_exr(path)?;
-    let values = picture.coverage.unwrap_or_else(|| picture.pixels.iter().map(|p| p[0]).collect());
-    Ok((picture.width, picture.height, values))
+}
+
+/// Columns, rows and values of a coverage mask, from the bytes of an .npy file (H×W; bytes are taken as 0..255).
+///
+/// # Errors
+/// Not such a file, wrong type or dimensions.
+pub fn parse_coverage_npy(bytes: &[u8]) -> Result<(usize, usize, Vec<f32>)> {
+    let mut array = npy::parse(bytes)?;
+    let [height, width] = array.shape[..] else {
+        return Err(Error::invalid("a coverage mask has two dimensions (rows, columns)"));
+    };
+    if array.stored == Stored::Bytes {
+        array.values.iter_mut().for_each(|v| *v /= 255.0);
+    }
+    Ok((width, height, array.values))
 }
 
 #[cfg(test)]

@@ -4,6 +4,11 @@ use crate::{Error, Result};
 use glam::DVec3;
 use toml::{Table, Value};
 
+/// Magnitude of a number at the most, and of a size at the least: products of a few stay finite in f64, so that nothing
+/// that is computed from a file becomes infinite or NaN.
+const MOST: f64 = 1e30;
+const LEAST: f64 = 1e-30;
+
 /// A table that remembers where it stands, for messages.
 pub(crate) struct Reader<'a> {
     table: &'a Table,
@@ -42,7 +47,9 @@ impl<'a> Reader<'a> {
     }
 
     pub(crate) fn number(&self, key: &str) -> Result<Option<f64>> {
-        self.get(key).map(|v| finite(v).ok_or_else(|| self.wrong(key, "a finite number"))).transpose()
+        self.get(key)
+            .map(|v| finite(v).ok_or_else(|| self.wrong(key, "a finite number of at most 1e30")))
+            .transpose()
     }
 
     pub(crate) fn number_or(&self, key: &str, default: f64) -> Result<f64> {
@@ -52,6 +59,16 @@ impl<'a> Reader<'a> {
     pub(crate) fn required_number(&self, key: &str) -> Result<f64> {
         let value = self.number(key)?;
         self.required(key, value)
+    }
+
+    /// A number above zero.
+    pub(crate) fn required_size(&self, key: &str) -> Result<f64> {
+        let value = self.required_number(key)?;
+        if value >= LEAST {
+            Ok(value)
+        } else {
+            Err(self.wrong(key, &format!("above 0 (at least {LEAST:e})")))
+        }
     }
 
     pub(crate) fn integer(&self, key: &str, range: std::ops::RangeInclusive<i64>) -> Result<Option<i64>> {
@@ -82,7 +99,9 @@ impl<'a> Reader<'a> {
             .map(|v| {
                 let list = v.as_array().filter(|a| a.len() == 3);
                 let parts = list.and_then(|a| Some([finite(&a[0])?, finite(&a[1])?, finite(&a[2])?]));
-                parts.map(DVec3::from_array).ok_or_else(|| self.wrong(key, "a list of three finite numbers"))
+                parts
+                    .map(DVec3::from_array)
+                    .ok_or_else(|| self.wrong(key, "a list of three finite numbers of at most 1e30"))
             })
             .transpose()
     }
@@ -96,7 +115,7 @@ impl<'a> Reader<'a> {
         self.get(key)
             .map(|v| {
                 let list = v.as_array().and_then(|a| a.iter().map(finite).collect());
-                list.ok_or_else(|| self.wrong(key, "a list of finite numbers"))
+                list.ok_or_else(|| self.wrong(key, "a list of finite numbers of at most 1e30"))
             })
             .transpose()
     }
@@ -133,13 +152,14 @@ fn finite(value: &Value) -> Option<f64> {
         Value::Integer(i) => *i as f64,
         _ => return None,
     };
-    number.is_finite().then_some(number)
+    (number.abs() <= MOST).then_some(number)
 }
 
 /// Parses TOML text, with the parser's message in one line.
 pub(crate) fn parse(text: &str) -> Result<Table> {
     text.parse::<Table>().map_err(|e| {
-        let line = e.span().map_or(1, |s| text[..s.start.min(text.len())].lines().count().max(1));
+        let before = |start: usize| text.bytes().take(start).filter(|b| *b == b'\n').count();
+        let line = 1 + e.span().map_or(0, |s| before(s.start));
         Error::invalid(format!("line {line}: {}", e.message().replace('\n', " ")))
     })
 }

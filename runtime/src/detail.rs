@@ -16,7 +16,8 @@ pub struct Detail {
 /// When a level is fine enough.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fineness {
-    /// Kernels reach no further than so many pixels; 0: always all samples. A third of it where the density varies.
+    /// Kernels reach no further than so many pixels; 0: always all samples. A third of it where the density varies, or where the
+    /// bake measured an error that is larger than the ratio below.
     pub kernel_pixels: f32,
     /// A level that the bake measured to have no more than so many times the error of all samples may reach
     /// [`Self::MEASURED`] times as far.
@@ -38,12 +39,11 @@ impl Fineness {
         // Reach of a level over what it may be.
         let excess = |k: usize| {
             let all = levels[0].error;
-            let good =
-                matches!((all, levels[k].error), (Some(all), Some(own)) if own <= self.error_ratio * all);
+            let good = all.zip(levels[k].error).map(|(all, own)| own <= self.error_ratio * all);
             let factor = match (good, varies) {
-                (true, _) => Self::MEASURED,
-                (false, true) => 1.0 / 3.0,
-                (false, false) => 1.0,
+                (Some(true), _) => Self::MEASURED,
+                (Some(false), _) | (None, true) => 1.0 / 3.0,
+                (None, false) => 1.0,
             };
             levels[k].reach * pixels / (factor * self.kernel_pixels)
         };
@@ -92,13 +92,14 @@ pub fn pixels_at_nearest(frame: &Frame, info: &Info) -> f32 {
 mod tests {
     use super::*;
 
-    fn levels(errors: [f64; 4]) -> Vec<Detail> {
-        (0..4).map(|k| Detail { reach: 0.02 * 1.6f32.powi(k as i32), error: Some(errors[k]) }).collect()
+    fn levels(errors: Option<[f64; 4]>) -> Vec<Detail> {
+        let one = |k: usize| Detail { reach: 0.02 * 1.6f32.powi(k as i32), error: errors.map(|e| e[k]) };
+        (0..4).map(one).collect()
     }
 
     #[test]
     fn small_objects_get_coarse_levels_and_large_ones_all_samples() {
-        let levels = levels([0.02, 0.03, 0.05, 0.1]);
+        let levels = levels(None);
         let level = |pixels| Fineness::DEFAULT.choose(&levels, pixels, false).level;
         assert_eq!([level(1000.0), level(90.0), level(60.0), level(1.0)], [0, 1, 2, 3]);
         assert_eq!(Fineness::DEFAULT.choose(&levels, 60.0, true).level, 0);
@@ -108,18 +109,19 @@ mod tests {
 
     #[test]
     fn a_level_measured_to_be_good_serves_larger_objects() {
-        let (bad, good) = (levels([0.02, 0.03, 0.05, 0.1]), levels([0.02, 0.021, 0.05, 0.1]));
-        assert_eq!(Fineness::DEFAULT.choose(&bad, 400.0, false).level, 0);
+        let good = levels(Some([0.02, 0.021, 0.05, 0.1]));
         assert_eq!(Fineness::DEFAULT.choose(&good, 400.0, false).level, 1);
         // Varying density or not: the error says it.
         assert_eq!(Fineness::DEFAULT.choose(&good, 400.0, true).level, 1);
-        let unknown: Vec<Detail> = good.iter().map(|d| Detail { error: None, ..*d }).collect();
-        assert_eq!(Fineness::DEFAULT.choose(&unknown, 400.0, false).level, 0);
+        assert_eq!(Fineness::DEFAULT.choose(&levels(None), 400.0, false).level, 0);
+        // A level known to be worse only where it hardly shows.
+        let level = |pixels| Fineness::DEFAULT.choose(&good, pixels, false).level;
+        assert_eq!([level(60.0), level(20.0), level(1.0)], [1, 2, 3]);
     }
 
     #[test]
     fn levels_fade_into_each_other_without_a_jump() {
-        let levels = levels([0.02, 0.03, 0.05, 0.1]);
+        let levels = levels(None);
         // Fineness as a number: the level, and how far it has faded into the next.
         let at = |pixels: f32| {
             let choice = Fineness::DEFAULT.choose(&levels, pixels, false);

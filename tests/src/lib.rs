@@ -6,6 +6,7 @@
 //! mesh, medium, asset ─> rivals ────┘            └─> sweep (table, summary, charts)
 //! ```
 
+pub mod hostile;
 pub mod metrics;
 pub mod play;
 pub mod range;

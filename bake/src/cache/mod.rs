@@ -55,15 +55,19 @@ impl Cache {
         self.folder.as_ref().map(|_| self.report.borrow().clone())
     }
 
-    /// The result that belongs to `key`: from the folder, or made and kept there.
+    /// The result that belongs to `key`: from the folder if it `fits` the bake, or made and kept there.
     pub fn get<T: Serialize + DeserializeOwned>(
         &self,
         key: &Key,
+        fits: impl FnOnce(&T) -> bool,
         make: impl FnOnce() -> Result<T>,
     ) -> Result<T> {
         let Some(folder) = &self.folder else { return make() };
         let path = folder.join(key.file_name());
         match read(&path) {
+            Ok(Some(value)) if !fits(&value) => {
+                self.problem(format!("'{}' belongs to another bake and was made again", path.display()));
+            }
             Ok(Some(value)) => {
                 self.report.borrow_mut().reused.push(key.stage().to_owned());
                 return Ok(value);
@@ -86,11 +90,17 @@ impl Cache {
 
 /// `None` where there is no such file; an error says what is wrong with it.
 fn read<T: DeserializeOwned>(path: &Path) -> std::result::Result<Option<T>, String> {
-    let bytes = match std::fs::read(path) {
-        Ok(bytes) => bytes,
-        Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(None),
-        Err(e) => return Err(format!("could not be read ({e})")),
-    };
+    match files::read(path, files::Kind::Kept) {
+        Ok(bytes) => parse(&bytes).map(Some),
+        Err(diaphane_formats::Error::Io { cause, .. }) if cause.kind() == std::io::ErrorKind::NotFound => {
+            Ok(None)
+        }
+        Err(e) => Err(format!("could not be read ({e})")),
+    }
+}
+
+/// The value in a file of the cache. Its memory is a small multiple of the file's size: lists grow as they are read.
+pub(crate) fn parse<T: DeserializeOwned>(bytes: &[u8]) -> std::result::Result<T, String> {
     let damaged = || "is damaged".to_owned();
     let (head, rest) = bytes.split_at_checked(MAGIC.len()).ok_or_else(damaged)?;
     let (sum, payload) = rest.split_at_checked(SUM).ok_or_else(damaged)?;
@@ -98,7 +108,7 @@ fn read<T: DeserializeOwned>(path: &Path) -> std::result::Result<Option<T>, Stri
         return Err(damaged());
     }
     match bincode::serde::decode_from_slice(payload, bincode::config::legacy()) {
-        Ok((value, used)) if used == payload.len() => Ok(Some(value)),
+        Ok((value, used)) if used == payload.len() => Ok(value),
         _ => Err(damaged()),
     }
 }
@@ -118,7 +128,7 @@ mod tests {
     use super::*;
 
     fn get(cache: &Cache, key: &Key, value: u64) -> u64 {
-        cache.get(key, || Ok(value)).unwrap()
+        cache.get(key, |_| true, || Ok(value)).unwrap()
     }
 
     #[test]
@@ -158,6 +168,29 @@ mod tests {
             assert!(report.problems[0].contains("is damaged and was made again"), "{:?}", report.problems);
             assert_eq!(get(&cache, &key, 7), 6);
         }
+    }
+
+    #[test]
+    fn what_does_not_fit_is_made_again_and_said_so() {
+        let folder = tempfile::tempdir().unwrap();
+        let key = Key::new("numbers", &1).unwrap();
+        let cache = Cache::open(Some(folder.path())).unwrap();
+        get(&cache, &key, 5);
+        assert_eq!(cache.get(&key, |v| *v != 5, || Ok(6u64)).unwrap(), 6);
+        assert!(cache.report().unwrap().problems[0].contains("belongs to another bake and was made again"));
+        assert_eq!(get(&cache, &key, 7), 6);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_pipe_in_the_folder_is_not_waited_for() {
+        let folder = tempfile::tempdir().unwrap();
+        let key = Key::new("numbers", &1).unwrap();
+        let pipe = folder.path().join(key.file_name());
+        assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+        let cache = Cache::open(Some(folder.path())).unwrap();
+        assert_eq!(get(&cache, &key, 5), 5);
+        assert!(cache.report().unwrap().problems[0].contains("not a regular file"));
     }
 
     #[test]

@@ -97,6 +97,27 @@ pub(crate) fn measure(
 }
 
 impl Measured {
+    /// Whether one read from a cache can be that of any bake.
+    pub fn fits(&self, seed: u64) -> bool {
+        let rays = self.views.iter().try_fold(0usize, |sum, view| sum.checked_add(view.1));
+        let whole = |light: &Vec<f32>| Some(light.len()) == rays && light.iter().all(|v| v.is_finite());
+        let truth =
+            |light: &Radiance| Some(light.len()) == rays && light.iter().flatten().all(|v| v.is_finite());
+        self.seed == seed
+            && self.views.iter().all(|view| view.0.is_finite())
+            && self.truth.len() == LIGHTS
+            && self.truth.iter().all(truth)
+            && self.played.len() == LIGHTS
+            && self.with_exact_light.len() == EXACT.len()
+            && self.coarser.iter().all(|level| level.len() == EXACT.len())
+            && self
+                .played
+                .iter()
+                .chain(&self.with_exact_light)
+                .chain(self.coarser.iter().flatten())
+                .all(whole)
+    }
+
     /// The certificate for the albedo and phase function of `medium`, and the errors of the coarser levels: they are measured
     /// under fewer lights, and scaled by what all samples show under these.
     pub fn certificate(&self, medium: &Medium) -> (Certificate, Vec<Option<f32>>) {

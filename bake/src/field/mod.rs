@@ -82,10 +82,24 @@ impl<'a> Shape<'a> {
 pub(crate) fn grid_cells(mesh: &Mesh, samples: usize) -> f64 {
     let (low, high) = mesh.bounds();
     let spacing = (mesh.volume() / samples as f64).cbrt();
-    ((high - low).max_element() / (0.6 * spacing)).clamp(24.0, 80.0)
+    ((high - low).max_element() / (0.6 * spacing)).clamp(24.0, MOST_CELLS)
 }
 
+/// Cells along the longest side at the most.
+const MOST_CELLS: f64 = 80.0;
+
 impl DistanceGrid {
+    /// Whether one read from a cache can be one: its numbers fit together.
+    pub fn fits(&self) -> bool {
+        let sizes = self.size.iter().all(|n| (2..MOST_CELLS as usize + 8).contains(n));
+        sizes
+            && self.size.iter().product::<usize>() == self.depth.len()
+            && self.origin.is_finite()
+            && self.cell > 0.0
+            && self.cell.is_finite()
+            && self.depth.iter().all(|d| d.is_finite())
+    }
+
     pub fn new(shape: &Shape<'_>, cells: f64, stage: Stage<'_>) -> Result<Self> {
         let Shape { mesh, accel, .. } = shape;
         let (low, high) = mesh.bounds();

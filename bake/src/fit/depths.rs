@@ -233,6 +233,21 @@ fn towards_surface(shape: &Shape<'_>, sample: &Candidate, nearest: Option<Neares
 }
 
 impl Lit {
+    /// Whether one read from a cache can be that of `samples` samples in `directions` directions with so many held-out
+    /// lights.
+    pub fn fits(&self, samples: usize, directions: usize, matched: bool, held_out: usize) -> bool {
+        let kept = self.keep.iter().filter(|k| **k).count();
+        let rows = kept * directions;
+        self.keep.len() == samples
+            && self.surface.len() == kept
+            && self.surface.iter().all(|v| v.is_finite())
+            && self.offset.len() == kept
+            && self.transmittance.len() == rows
+            && self.boundary.len() == if matched { 0 } else { rows }
+            && self.held_out.len() == held_out
+            && self.held_out.iter().all(|light| light.len() == kept && light.iter().all(|v| v.is_finite()))
+    }
+
     /// Takes what arrives from held-out lights at all samples of the block, those without light too.
     pub fn hold_out(&mut self, mut arriving: Vec<Vec<f32>>) {
         arriving.iter_mut().for_each(|light| compact(light, &self.keep, 1));

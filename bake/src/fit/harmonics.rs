@@ -7,7 +7,7 @@
 
 use super::boundary::{BOUNDARY_ORDER, boundary};
 use super::depths::{Lit, directions};
-use super::ladder::{FirstFits, all_bands};
+use super::ladder::{FirstFits, all_bands, suits};
 use super::levels::Levels;
 use super::rounding::Rounding;
 use crate::params::Params;
@@ -29,6 +29,17 @@ pub(crate) struct Light {
 }
 
 impl Light {
+    /// Whether one read from a cache can be that of so many samples.
+    pub fn fits(&self, samples: usize, matched: bool, params: &Params) -> bool {
+        let boundary = if matched { (0, 0) } else { (samples, params.order.min(BOUNDARY_ORDER)) };
+        suits(self.encoding, params)
+            && self.lobe.len() == if self.encoding.has_lobe() { samples } else { 0 }
+            && self.lobe.iter().all(|v| v.is_finite())
+            && self.depth.validate(samples, params.peak_order(), "depth").is_ok()
+            && self.boundary.validate(boundary.0, boundary.1, "boundary").is_ok()
+            && self.boundary.order.iter().all(|k| usize::from(*k) == boundary.1)
+    }
+
     /// No light at all for `count` samples, and this many bands of the boundary's transmittance (0: index matched).
     pub fn none(count: usize, boundary_order: usize) -> Self {
         let dark = |order: usize| Coefficients::zeros(vec![order as u8; count]).quantised();
@@ -62,6 +73,20 @@ pub(crate) struct Fits {
 }
 
 impl Fits {
+    /// Whether one read from a cache can be that of so many samples that receive light.
+    pub fn fits(&self, samples: usize, matched: bool, params: &Params) -> bool {
+        let count: usize = self.order.iter().map(|k| usize::from(*k).pow(2)).sum();
+        let boundary = if matched { 0 } else { params.order.min(BOUNDARY_ORDER).pow(2) };
+        suits(self.encoding, params)
+            && self.order.len() == samples
+            && self.order.iter().all(|k| usize::from(*k) <= params.peak_order())
+            && self.values.len() == count
+            && self.lobe.len() == samples
+            && self.boundary.len() == samples * boundary
+            && self.values.iter().chain(&self.boundary).all(|v| v.is_finite())
+            && self.lobe.iter().all(|v| v.is_finite())
+    }
+
     /// Those of more samples behind these.
     pub fn append(&mut self, more: Self) {
         self.order.extend(more.order);

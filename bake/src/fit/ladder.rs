@@ -79,6 +79,36 @@ pub(crate) struct FirstFits {
     ways: Vec<Ways>,
 }
 
+impl Fitted {
+    fn fits(&self, highest: usize) -> bool {
+        self.order <= highest
+            && self.coefficients.len() == self.order * self.order
+            && self.coefficients.iter().all(|c| c.is_finite())
+            && self.lobe.is_finite()
+            && self.error.is_finite()
+    }
+}
+
+impl FirstFits {
+    /// Whether one read from a cache can be that of so many samples that receive light.
+    pub fn fits(&self, samples: usize, params: &Params) -> bool {
+        let highest = first_order(params);
+        let way = |w: &Ways| w.plain.fits(highest) && w.lobed.fits(highest);
+        suits(self.encoding, params) && self.ways.len() == samples && self.ways.iter().all(way)
+    }
+}
+
+/// Whether an encoding can be the one that a bake with these parameters chose.
+pub(super) fn suits(encoding: Encoding, params: &Params) -> bool {
+    match (encoding, params.representation) {
+        (Encoding::Transmittance, Representation::Transmittance) => true,
+        (Encoding::Depth, Representation::Depth) => true,
+        (Encoding::Reciprocal { epsilon }, Representation::Reciprocal)
+        | (Encoding::Lobe { epsilon }, Representation::Lobe) => EPSILONS.contains(&epsilon),
+        _ => false,
+    }
+}
+
 /// Bands that the first fits of a bake have at most.
 pub(crate) fn first_order(params: &Params) -> usize {
     params.order.min(FIRST)

@@ -36,6 +36,18 @@ pub(crate) struct Nested {
 }
 
 impl Nested {
+    /// Whether one read from a cache can be that of so many samples: an order names each of them once.
+    pub fn fits(&self, samples: usize) -> bool {
+        let mut open = vec![true; samples];
+        let first = |i: &u32| open.get_mut(*i as usize).is_some_and(std::mem::take);
+        self.order.len() == samples
+            && self.order.iter().all(first)
+            && self.levels.first().is_some_and(|(weight, _)| weight.len() == samples)
+            && self.levels.iter().all(|(weight, width)| {
+                width.is_finite() && *width > 0.0 && weight.iter().all(|w| w.is_finite() && *w >= 0.0)
+            })
+    }
+
     /// Weights of all samples, and the coarser levels.
     pub fn weights(self) -> (Vec<f32>, Vec<Level>) {
         let mut levels = self.levels.into_iter();

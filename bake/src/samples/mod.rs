@@ -65,6 +65,17 @@ pub(crate) struct Placed {
 }
 
 /// Inside points for each sample when weights are fitted.
+impl Placed {
+    /// Whether one read from a cache can be that of any bake.
+    pub fn fits(&self) -> bool {
+        let sample = |s: &Candidate| {
+            s.position.is_finite() && s.radius > 0.0 && s.radius.is_finite() && s.fluence.is_finite()
+        };
+        let probe = |p: &Probe| p.position.is_finite() && p.fluence.is_finite();
+        !self.samples.is_empty() && self.samples.iter().all(sample) && self.probes.iter().all(probe)
+    }
+}
+
 const PROBES_PER_SAMPLE: usize = 8;
 
 /// Places about `wanted` samples. `factor` scales the radius that the light asks for at a point.

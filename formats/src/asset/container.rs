@@ -20,7 +20,7 @@
 
 use crate::{Error, Result};
 
-pub(super) const MAGIC: &[u8; 8] = b"DIAPHANE";
+pub(crate) const MAGIC: &[u8; 8] = b"DIAPHANE";
 const HEADER: usize = 32;
 const ENTRY: usize = 24;
 const ALIGNMENT: usize = 64;

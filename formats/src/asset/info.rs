@@ -2,6 +2,7 @@
 
 use super::Certificate;
 use crate::encoding::Encoding;
+use crate::medium::{Density, Medium};
 use crate::mesh::MeshReport;
 use crate::phase::Phase;
 use crate::sh::MAX_ORDER;
@@ -107,10 +108,17 @@ impl Info {
         {
             return fail("encoding");
         }
+        if !self.ratio().is_finite() {
+            return fail("extinction");
+        }
+        let [low, high] = self.bounds.map(Vec3::from);
         let diagonal = self.diagonal();
-        if !(diagonal.is_finite() && diagonal > 0.0) {
+        if !(low.cmple(high).all() && diagonal.is_finite() && diagonal > 0.0) {
             return fail("bounding box");
         }
+        let (extinction, albedo) = (DVec3::from(self.extinction), DVec3::from(self.albedo));
+        Medium::new(extinction, albedo, self.phase, self.ior, Density::Uniform(self.uniform_density))
+            .map_err(|e| Error::invalid(format!("the asset's {e}")))?;
         self.certificate.map_or(Ok(()), |c| c.validate())
     }
 }

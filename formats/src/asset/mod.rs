@@ -12,6 +12,8 @@ mod places;
 mod read;
 mod write;
 
+pub(crate) use container::MAGIC;
+
 pub use certificate::{Certificate, CertifiedError};
 pub use info::{Info, Provenance};
 pub use levels::{Level, MAX_LEVELS};

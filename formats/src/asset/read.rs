@@ -15,7 +15,7 @@ use std::path::Path;
 /// # Errors
 /// Unreadable, foreign, truncated, damaged or future file, in one clear line.
 pub fn read(path: &Path) -> Result<Asset> {
-    parse(&files::read(path)?).map_err(|e| e.in_file(path))
+    parse(&files::read(path, files::Kind::Asset)?).map_err(|e| e.in_file(path))
 }
 
 /// As [`read`], from the file's bytes.
@@ -33,9 +33,9 @@ pub fn parse(bytes: &[u8]) -> Result<Asset> {
 /// As [`read`]; no such level.
 pub fn read_level(path: &Path, level: usize) -> Result<Asset> {
     let in_file = |e: Error| e.in_file(path);
-    let head = files::read_front(path, Table::MOST)?;
+    let head = files::read_front(path, files::Kind::Asset, Table::MOST)?;
     let (table, last) = find_level(&head, level).map_err(in_file)?;
-    let front = files::read_front(path, table.front(last))?;
+    let front = files::read_front(path, files::Kind::Asset, table.front(last))?;
     parse_level(&front, level).map_err(in_file)
 }
 
@@ -104,10 +104,16 @@ impl<'a> Parts<'a> {
         self.find(kind, part)?.ok_or_else(lacks)
     }
 
-    /// All parts of samples one after the other; nothing where a part has no such section.
+    /// All parts of samples one after the other; nothing where none has such a section. All or none must have it, so that
+    /// each level can be read alone.
     fn joined(&self, kind: Kind) -> Result<Vec<u8>> {
         let parts = (1..=self.last).filter_map(|part| self.find(kind, part).transpose());
-        Ok(parts.collect::<Result<Vec<_>>>()?.concat())
+        let parts = parts.collect::<Result<Vec<_>>>()?;
+        if parts.is_empty() || parts.len() == usize::from(self.last) {
+            Ok(parts.concat())
+        } else {
+            Err(Error::invalid(format!("some parts of the asset lack section {}", kind as u16)))
+        }
     }
 
     fn weight(&self, part: u16) -> Result<Vec<f32>> {

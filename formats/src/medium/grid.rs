@@ -2,6 +2,7 @@
 //! them; an axis of length 1 is constant.
 
 use super::field::march;
+use crate::npy::{self, Stored};
 use crate::{Error, Result, files};
 use glam::DVec3;
 use std::path::Path;
@@ -54,17 +55,26 @@ impl Grid {
         if path.extension().and_then(|e| e.to_str()) != Some("npy") {
             return Err(Error::file(path, "density grids are .npy files"));
         }
-        let (shape, kind, values) = read_npy(&files::read(path)?).map_err(|e| e.in_file(path))?;
-        if kind == NpyKind::Bytes {
-            return Err(Error::file(path, "holds 8-bit integers; save the densities as float32 or float64"));
+        let bytes = files::read(path, files::Kind::Npy)?;
+        Self::parse_npy(&bytes, min, max).map_err(|e| e.in_file(path))
+    }
+
+    /// As [`Self::load_npy`], from the file's bytes.
+    ///
+    /// # Errors
+    /// As [`Self::load_npy`].
+    pub fn parse_npy(bytes: &[u8], min: DVec3, max: DVec3) -> Result<Self> {
+        let array = npy::parse(bytes)?;
+        if array.stored == Stored::Bytes {
+            return Err(Error::invalid("holds 8-bit integers; save the densities as float32 or float64"));
         }
-        let [nz, ny, nx] = shape[..] else {
-            return Err(Error::file(
-                path,
-                format!("has {} dimensions; a density grid has 3 ([z][y][x])", shape.len()),
-            ));
+        let [nz, ny, nx] = array.shape[..] else {
+            return Err(Error::invalid(format!(
+                "has {} dimensions; a density grid has 3 ([z][y][x])",
+                array.shape.len()
+            )));
         };
-        Self::new([nx, ny, nz], min, max, values).map_err(|e| e.in_file(path))
+        Self::new([nx, ny, nz], min, max, array.values)
     }
 
     /// Whether the values vary along one axis only, so that integrals have a closed form.
@@ -159,56 +169,6 @@ impl Grid {
     }
 }
 
-/// What an .npy file held before it became f32.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum NpyKind {
-    /// float32 or float64.
-    Floats,
-    /// uint8.
-    Bytes,
-}
-
-/// Shape, kind and values of an .npy file; the data must fill the file exactly.
-pub(crate) fn read_npy(bytes: &[u8]) -> Result<(Vec<usize>, NpyKind, Vec<f32>)> {
-    let bad = |m: String| Error::invalid(format!("is not a usable .npy file: {m}"));
-    let file = npyz::NpyFile::new(bytes).map_err(|e| bad(e.to_string()))?;
-    if file.order() != npyz::Order::C {
-        return Err(bad("it is in Fortran order; save it in C order".to_owned()));
-    }
-    let shape: Vec<usize> = file.shape().iter().map(|&n| n as usize).collect();
-    let count = shape.iter().try_fold(1usize, |a, &n| a.checked_mul(n));
-    let kind = file.dtype().descr();
-    let size = match kind.trim_matches('\'') {
-        "<f4" => 4,
-        "<f8" => 8,
-        "|u1" => 1,
-        other => return Err(bad(format!("its type is {other}; use little-endian float32 or float64"))),
-    };
-    let data = bytes.len() - header_length(bytes).ok_or_else(|| bad("its header is cut".to_owned()))?;
-    if count.and_then(|c| c.checked_mul(size)) != Some(data) {
-        return Err(bad(format!(
-            "its header promises {shape:?} values of {size} bytes but {data} bytes follow"
-        )));
-    }
-    let failed = |e: std::io::Error| bad(e.to_string());
-    let values = match size {
-        4 => file.into_vec::<f32>().map_err(failed)?,
-        8 => file.into_vec::<f64>().map_err(failed)?.into_iter().map(|v| v as f32).collect(),
-        _ => file.into_vec::<u8>().map_err(failed)?.into_iter().map(f32::from).collect(),
-    };
-    let kind = if size == 1 { NpyKind::Bytes } else { NpyKind::Floats };
-    Ok((shape, kind, values))
-}
-
-/// Bytes before the data: magic, version, header length field, header (NumPy's format description).
-fn header_length(bytes: &[u8]) -> Option<usize> {
-    let length = match bytes.get(6)? {
-        1 => 10 + usize::from(u16::from_le_bytes(bytes.get(8..10)?.try_into().ok()?)),
-        _ => 12 + u32::from_le_bytes(bytes.get(8..12)?.try_into().ok()?) as usize,
-    };
-    (length <= bytes.len()).then_some(length)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -254,16 +214,13 @@ mod tests {
         header.extend((text.len() as u16).to_le_bytes());
         header.extend(text.bytes());
         header.extend([1, 2]);
-        assert_eq!(read_npy(&header).unwrap(), (vec![1, 1, 2], NpyKind::Bytes, vec![1.0, 2.0]));
         std::fs::write(&path, header).unwrap();
         let error = Grid::load_npy(&path, DVec3::ZERO, DVec3::ONE).unwrap_err().to_string();
         assert!(error.contains("float32"), "{error}");
     }
 
     #[test]
-    fn bad_files_are_refused() {
-        assert!(read_npy(b"").is_err());
-        assert!(read_npy(b"\x93NUMPY\x01\x00\xff\xff").is_err());
+    fn bad_grids_are_refused() {
         assert!(Grid::new([2, 2, 2], DVec3::ZERO, DVec3::ONE, vec![1.0; 7]).is_err());
         assert!(Grid::new([1, 1, 1], DVec3::ONE, DVec3::ZERO, vec![1.0]).is_err());
         assert!(Grid::new([1, 1, 1], DVec3::ZERO, DVec3::ONE, vec![f32::NAN]).is_err());

@@ -8,7 +8,6 @@ mod shapes;
 
 pub use field::{Density, Layers};
 pub use grid::Grid;
-pub(crate) use grid::{NpyKind, read_npy};
 pub use noise::Noise;
 pub use sampled::{RunningIntegral, SampledDensity};
 pub use shapes::{Shape, Shapes, Solid};

@@ -41,8 +41,9 @@ impl Noise {
         let s = f * f * (3.0 - 2.0 * f);
         let [i, j, k] = cell.to_array().map(|c| c as i64);
         let corner = |di: i64, dj: i64, dk: i64| {
-            let mix = hash(self.seed ^ u64::from(octave) << 56, (i + di) as u64);
-            let mix = hash(hash(mix, (j + dj) as u64), (k + dk) as u64);
+            // The lattice ends where its cells are no longer told apart; the last ones have no neighbours.
+            let mix = hash(self.seed ^ u64::from(octave) << 56, i.saturating_add(di) as u64);
+            let mix = hash(hash(mix, j.saturating_add(dj) as u64), k.saturating_add(dk) as u64);
             (mix >> 11) as f64 / (1u64 << 53) as f64
         };
         let lerp = |a: f64, b: f64, t: f64| a + (b - a) * t;

@@ -162,6 +162,9 @@ fn torus_distance(p: DVec3, axis: DVec3, radius: f64) -> f64 {
     ring.hypot(h)
 }
 
+/// Steps to a torus's crossings at the most; a ray that needs more runs along its surface.
+const MOST_STEPS: usize = 100_000;
+
 /// Steps along the ray by the distance to the tube, which never oversteps, and bisects each change of sign.
 fn torus_crossings(p: DVec3, direction: DVec3, axis: DVec3, radius: f64, tube: f64, out: &mut Vec<f64>) {
     let b = p.dot(direction);
@@ -174,8 +177,12 @@ fn torus_crossings(p: DVec3, direction: DVec3, axis: DVec3, radius: f64, tube: f
     let distance = |t: f64| torus_distance(p + direction * t, axis, radius) - tube;
     let (mut t, last) = (-b - d.sqrt(), -b + d.sqrt());
     let mut value = distance(t);
-    let least = 1e-4 * tube;
-    while t < last {
+    // A step that is lost in rounding would never arrive.
+    let least = (1e-4 * tube).max(4.0 * f64::EPSILON * (t.abs() + last.abs()));
+    for _ in 0..MOST_STEPS {
+        if t >= last {
+            break;
+        }
         let step = value.abs().max(least);
         let next_value = distance(t + step);
         if (value < 0.0) != (next_value < 0.0) {

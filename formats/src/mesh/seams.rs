@@ -5,6 +5,7 @@ use super::MeshReport;
 use super::pieces::edges;
 use super::weld::clean;
 use glam::{DVec3, I64Vec3};
+use std::cell::Cell;
 use std::collections::HashMap;
 
 /// Vertices on open edges nearer to each other than this, in diagonals, are taken for one, and one as near to an open edge
@@ -13,6 +14,11 @@ const HAIR: f64 = 1e-5;
 
 /// Rounds of splitting: each splits at most one edge of a triangle.
 const ROUNDS: usize = 4;
+
+/// Triangles that splitting may leave for each one before it, and vertices that are looked at for each open edge: a seam needs
+/// a few, while thousands of edges on one line would be split at each other without end. Edges beyond that stay open.
+const MOST_TRIANGLES: usize = 8;
+const MOST_TESTS: usize = 1000;
 
 /// Mends seams of triangles whose edges without a partner are `lone`; `None` if there is nothing to mend.
 pub(super) fn mend(
@@ -35,9 +41,10 @@ pub(super) fn mend(
         report.mending.stitched = merged.len();
         mended = clean(positions, mended.into_iter().map(|t| t.map(one)).collect(), report);
     }
+    let most = MOST_TRIANGLES.saturating_mul(mended.len());
     for _ in 0..ROUNDS {
         let lone = lone_edges(&mended);
-        let splits = split(positions, &mut mended, &lone, low, reach);
+        let splits = split(positions, &mut mended, &lone, (low, reach), most);
         if splits == 0 {
             break;
         }
@@ -83,13 +90,14 @@ fn merge(positions: &[DVec3], open: &[u32], low: DVec3, reach: f64) -> HashMap<u
     merged
 }
 
-/// Splits triangles at vertices of other open edges that lie on their own; says how many edges were split.
+/// Splits triangles at vertices of other open edges that lie on their own, until there are `most`; says how many edges were
+/// split.
 fn split(
     positions: &[DVec3],
     triangles: &mut Vec<[u32; 3]>,
     lone: &[(u32, u32)],
-    low: DVec3,
-    reach: f64,
+    (low, reach): (DVec3, f64),
+    most: usize,
 ) -> usize {
     let at = |v: u32| positions[v as usize];
     let open = vertices(lone);
@@ -98,10 +106,12 @@ fn split(
     let cell = |p: DVec3| ((p - low) / length.max(reach)).floor().as_i64vec3();
     let mut places: HashMap<I64Vec3, Vec<u32>> = HashMap::new();
     open.iter().for_each(|&v| places.entry(cell(at(v))).or_default().push(v));
+    let left = Cell::new(MOST_TESTS.saturating_mul(lone.len()));
     // Vertices on the open edge from a to b, in their order along it.
     let between = |a: u32, b: u32| {
         let (p, along) = (at(a), at(b) - at(a));
         let on = |v: u32| {
+            left.set(left.get().saturating_sub(1));
             let t = (at(v) - p).dot(along) / along.length_squared();
             let beside = (p + along * t).distance(at(v));
             (v != a && v != b && t > 0.0 && t < 1.0 && beside <= reach).then_some((t, v))
@@ -129,6 +139,9 @@ fn split(
             let [a, b, c] = [t[k], t[(k + 1) % 3], t[(k + 2) % 3]];
             if lone.binary_search(&(a.min(b), a.max(b))).is_err() {
                 continue;
+            }
+            if left.get() == 0 || triangles.len() > most {
+                return splits;
             }
             let mut line = between(a, b);
             line.retain(|v| *v != c);

@@ -5,7 +5,12 @@ use crate::visibility::Accel;
 use glam::DVec3;
 use rayon::prelude::*;
 
-/// Pairs of triangles without a common vertex, one of which an edge of the other passes through.
+/// Triangles that each is tested with, at the most: where everything crosses everything, the exact count is not worth its
+/// time.
+const MOST_LOOKED: usize = 1000;
+
+/// Pairs of triangles without a common vertex, one of which an edge of the other passes through;
+/// a lower bound where a triangle has very many neighbours.
 pub(super) fn count(mesh: &Mesh) -> usize {
     let accel = Accel::new(mesh);
     (0..mesh.triangles.len())
@@ -15,7 +20,7 @@ pub(super) fn count(mesh: &Mesh) -> usize {
             let corners = mesh.corners(i);
             let low = corners[0].min(corners[1]).min(corners[2]);
             let high = corners[0].max(corners[1]).max(corners[2]);
-            let mut crossings = 0;
+            let (mut crossings, mut looked) = (0, 0);
             accel.for_each_in_box(low, high, |j| {
                 if j > i
                     && !mesh.triangles[j].iter().any(|v| own.contains(v))
@@ -23,6 +28,8 @@ pub(super) fn count(mesh: &Mesh) -> usize {
                 {
                     crossings += 1;
                 }
+                looked += 1;
+                looked < MOST_LOOKED
             });
             crossings
         })

@@ -152,13 +152,15 @@ impl Accel {
         })
     }
 
-    /// Calls `visit` with every triangle whose padded box meets the given box.
-    pub fn for_each_in_box(&self, low: DVec3, high: DVec3, mut visit: impl FnMut(usize)) {
+    /// Calls `visit` with every triangle whose padded box meets the given box, until it says that this is enough.
+    pub fn for_each_in_box(&self, low: DVec3, high: DVec3, mut visit: impl FnMut(usize) -> bool) {
         let query = Aabb::new(self.local(low).as_vec3a(), self.local(high).as_vec3a());
         self.bvh.aabb_traverse(query, |bvh, index| {
             let node = &bvh.nodes[index as usize];
             for slot in node.first_index..node.first_index + node.prim_count {
-                visit(bvh.primitive_indices[slot as usize] as usize);
+                if !visit(bvh.primitive_indices[slot as usize] as usize) {
+                    return false;
+                }
             }
             true
         });

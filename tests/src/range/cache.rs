@@ -97,7 +97,7 @@ impl Subject<'_> {
 fn read([exr, json]: &[PathBuf; 2], scene: &Scene) -> Result<Reference> {
     let facts: Facts = serde_json::from_str(&files::read_text(json)?)
         .map_err(|e| Error::file(json, format!("is damaged: {e}")))?;
-    let bytes = files::read(exr)?;
+    let bytes = files::read(exr, files::Kind::Kept)?;
     if blake3::hash(&bytes).to_hex().as_str() != facts.picture {
         return Err(Error::file(exr, "is damaged: its checksum is another one"));
     }
@@ -115,7 +115,7 @@ fn write([exr, json]: &[PathBuf; 2], reference: &Reference) -> Result<()> {
         error: reference.error,
         converged: reference.converged,
         rays: reference.rays,
-        picture: blake3::hash(&files::read(exr)?).to_hex().to_string(),
+        picture: blake3::hash(&files::read(exr, files::Kind::Exr)?).to_hex().to_string(),
     };
     let text = serde_json::to_string(&facts)
         .map_err(|e| Error::file(json, format!("cannot hold the reference's facts: {e}")))?;

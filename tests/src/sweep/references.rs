@@ -68,7 +68,7 @@ pub fn obtain(
 
 fn read(picture_path: &Path, about_path: &Path) -> Result<Known> {
     let picture = read_exr(picture_path)?;
-    let about: About = serde_json::from_slice(&files::read(about_path)?)
+    let about: About = serde_json::from_slice(&files::read(about_path, files::Kind::Kept)?)
         .map_err(|e| Error::file(about_path, format!("is damaged: {e}")))?;
     let coverage =
         picture.coverage.clone().ok_or_else(|| Error::file(picture_path, "has no coverage in alpha"))?;

@@ -26,7 +26,7 @@ impl Store {
         let mut good = String::new();
         if path.exists() {
             // Bytes, not text: damage may break the encoding.
-            let bytes = files::read(path)?;
+            let bytes = files::read(path, files::Kind::Kept)?;
             let unfinished = !bytes.is_empty() && !bytes.ends_with(b"\n");
             let lines: Vec<&[u8]> = bytes.split(|b| *b == b'\n').collect();
             for (i, line) in lines.iter().enumerate().filter(|(_, l)| !l.is_empty()) {

@@ -61,6 +61,7 @@ impl Lattice {
                     let normal = accel.normal(t as u32);
                     let off = normal.dot(a + 0.5 * step - mesh.corners(t)[0]);
                     touched |= off.abs() <= 0.5 * normal.abs().dot(step) * (1.0 + 1e-6);
+                    !touched
                 });
                 touched
             })

@@ -99,6 +99,6 @@ fn load(inputs: &Inputs, name: String, checked: &Checked) -> anyhow::Result<Case
         tell(&format!("warning: {}: the environment is left out of a sweep", inputs.scene.display()));
     }
     // The report goes into the asset; the mesh is read twice, which costs little.
-    let (_, report) = mesh::parse_obj(&files::read(&inputs.mesh)?)?;
+    let (_, report) = mesh::parse_obj(&files::read(&inputs.mesh, files::Kind::Mesh)?)?;
     Ok(Case::new(name, (loaded.mesh, report), loaded.medium, loaded.scene, checked.size))
 }
