@@ -3,9 +3,10 @@
 use super::objects::{Object, ball, torus};
 use super::scenes::{outside, scene};
 use super::{gpu, tell};
-use diaphane_formats::asset::Asset;
+use diaphane_formats::asset::{Asset, Level};
 use diaphane_formats::phase::Phase;
 use diaphane_formats::scene::{Camera, Light, Scene};
+use diaphane_runtime::detail::{Fineness, details, pixels_at_nearest};
 use diaphane_runtime::edit::Edit;
 use diaphane_runtime::frame::Frame;
 use diaphane_runtime::gpu::{
@@ -71,7 +72,11 @@ struct Host {
 
 impl Host {
     fn new(device: wgpu::Device, queue: wgpu::Queue) -> Self {
-        let renderer = Renderer::new(&device, Options::new(FORMAT)).unwrap();
+        Self::with(device, queue, Options::new(FORMAT))
+    }
+
+    fn with(device: wgpu::Device, queue: wgpu::Queue, options: Options) -> Self {
+        let renderer = Renderer::new(&device, options).unwrap();
         Self { device, queue, renderer, background: 0.0 }
     }
 
@@ -278,7 +283,7 @@ fn nothing_is_done_twice_and_nothing_out_of_sight() {
     host.put(&asset, Placement { translation: behind, ..Placement::IDENTITY });
     let first = host.draw(&host_frame(&scene, None));
     let samples = asset.samples.len() as u64;
-    let all = HostReport { drawn: 1, culled: 1, lit: 1, tiles: 1, samples, reused: false };
+    let all = HostReport { drawn: 1, culled: 1, lit: 1, tiles: 1, fading: 0, samples, reused: false };
     assert_eq!(host.renderer.report(), all);
     assert_eq!(host.draw(&host_frame(&scene, None)), first);
     assert_eq!(host.renderer.report(), HostReport { lit: 0, tiles: 0, samples: 0, reused: true, ..all });
@@ -292,4 +297,43 @@ fn nothing_is_done_twice_and_nothing_out_of_sight() {
     host.renderer.place(id, Placement { scale: 0.0, ..Placement::IDENTITY }).unwrap_err();
     host.renderer.remove_instance(id);
     tell(&host.renderer.place(id, Placement::IDENTITY).unwrap_err().to_string());
+}
+
+#[test]
+fn a_level_fades_into_the_next() {
+    let Some(GpuDevice { device, queue, .. }) = device() else { return };
+    let (mut asset, scene) = (ball().build(), scene(outside()));
+    let weight = vec![1.0; asset.samples.len() / 4];
+    asset.levels.push(Level { width_factor: 1.6 * asset.info.width_factor, weight, error: None });
+    let reach = details(&asset)[1].reach;
+    let pixels = pixels_at_nearest(&Frame::new(&scene, &asset.info).unwrap(), &asset.info);
+    // The coarse level reaches so many times as far as it may.
+    let at = |excess: f32| {
+        let fineness = Fineness { kernel_pixels: reach * pixels / excess, ..Fineness::DEFAULT };
+        let options = Options { fineness, ..Options::new(FORMAT) };
+        let mut host = Host::with(device.clone(), queue.clone(), options);
+        host.put(&asset, Placement::IDENTITY);
+        (host.draw(&host_frame(&scene, None)), host.renderer.report())
+    };
+    let ((fine, all), (coarse, few)) = (at(1.3), at(0.9));
+    assert_eq!((all.samples, all.fading), (asset.samples.len() as u64, 0));
+    assert_eq!((few.samples, few.fading), (asset.samples.len() as u64 / 4, 0));
+    let apart = |a: &[[f32; 4]], b: &[[f32; 4]]| {
+        let off = |(a, b): (&[f32; 4], &[f32; 4])| (0..4).map(|c| (a[c] - b[c]).abs()).fold(0.0, f32::max);
+        a.iter().zip(b).map(off).fold(0.0, f32::max) / peak(&fine)
+    };
+    let whole = apart(&fine, &coarse);
+    assert!(whole > 0.01, "{whole}");
+    for share in [0.25f32, 0.5, 0.75] {
+        let (both, report) = at(1.25 - 0.25 * share);
+        assert_eq!((report.fading, report.lit, report.samples), (1, 2, all.samples + few.samples));
+        let mix = |(f, c): (&[f32; 4], &[f32; 4])| {
+            let mut mixed = *f;
+            (0..3).for_each(|k| mixed[k] += share * (c[k] - f[k]));
+            mixed
+        };
+        let expected: Vec<[f32; 4]> = fine.iter().zip(&coarse).map(mix).collect();
+        // Targets are half floats.
+        assert!(apart(&both, &expected) < 2e-3, "{share}: {}", apart(&both, &expected));
+    }
 }
