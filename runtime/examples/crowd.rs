@@ -1,5 +1,5 @@
 //! A hundred objects of one asset, one of them filling the view, against that one alone:
-//! `cargo run --release -p diaphane-runtime --example crowd -- ASSET.dph PICTURE.png`.
+//! `cargo run --release -p diaphane-runtime --example crowd -- ASSET.dph PICTURE.png [quads|tiles]`.
 
 #[path = "support/picture.rs"]
 mod picture;
@@ -8,7 +8,7 @@ use anyhow::{Result, anyhow};
 use diaphane_formats::asset;
 use diaphane_formats::directions::even_directions;
 use diaphane_formats::scene::{Light, Surface};
-use diaphane_runtime::gpu::{HostFrame, Options, Renderer};
+use diaphane_runtime::gpu::{HostFrame, Options, Renderer, SplatPath};
 use diaphane_runtime::placement::{HostCamera, Placement};
 use diaphane_runtime::wgpu;
 use glam::{DQuat, DVec3, camera, dcamera};
@@ -20,14 +20,18 @@ const FRAMES: u32 = 5;
 
 fn main() -> Result<()> {
     let arguments: Vec<String> = std::env::args().collect();
-    let [_, asset, output] = &arguments[..] else {
-        return Err(anyhow!("usage: crowd ASSET.dph PICTURE.png"));
+    let (asset, output, path) = match &arguments[..] {
+        [_, asset, output] => (asset, output, None),
+        [_, asset, output, path] if path == "quads" => (asset, output, Some(SplatPath::Quads)),
+        [_, asset, output, path] if path == "tiles" => (asset, output, Some(SplatPath::Tiles)),
+        _ => return Err(anyhow!("usage: crowd ASSET.dph PICTURE.png [quads|tiles]")),
     };
     let asset = asset::read(Path::new(asset))?;
     let (device, queue) = picture::device()?;
     let target = picture::target(&device, SIZE, wgpu::TextureFormat::Rgba16Float);
     let view = target.create_view(&Default::default());
-    let mut renderer = Renderer::new(&device, Options::new(wgpu::TextureFormat::Rgba16Float))?;
+    let options = Options { path, ..Options::new(wgpu::TextureFormat::Rgba16Float) };
+    let mut renderer = Renderer::new(&device, options)?;
     let id = renderer.add_asset(&device, &asset)?;
     let scale = 1.0 / f64::from(asset.info.diagonal());
     let put = |place: DVec3, turn: f64| {
@@ -46,7 +50,7 @@ fn main() -> Result<()> {
         for k in 0..=FRAMES {
             // Camera and light move in every frame.
             let turn = 0.02 * f64::from(k);
-            let eye = DVec3::new(1.9 * turn.sin(), 0.35, 1.9 * turn.cos());
+            let eye = DVec3::new(1.25 * turn.sin(), 0.23, 1.25 * turn.cos());
             let lights = [Light::Point {
                 position: DVec3::new(2.0, 2.0 + turn, -1.5),
                 intensity: DVec3::new(60.0, 45.0, 30.0),

@@ -152,6 +152,9 @@ fn carried(light: &Light, placement: &Placement) -> Light {
     }
 }
 
+/// Side of the squares in which pixels are skipped.
+pub(crate) const SQUARE: u32 = 32;
+
 /// Columns and rows (first and behind the last) that an object may cover in a frame in its coordinates; `None` where it is out
 /// of sight.
 pub fn covered(frame: &Frame, info: &Info) -> Option<[[u32; 2]; 2]> {
@@ -185,6 +188,14 @@ pub fn covered(frame: &Frame, info: &Info) -> Option<[[u32; 2]; 2]> {
     let low = [0, 1].map(|c| (first[c] - 1.0) as u32);
     let high = [0, 1].map(|c| ((last[c] + 2.0) as u32).min(size[c]));
     (low[0] < high[0] && low[1] < high[1]).then_some([low, high])
+}
+
+/// Columns and rows as [`covered`] finds them, in whole squares of [`SQUARE`] pixels as far as the picture goes.
+pub(crate) fn covered_squares(frame: &Frame, info: &Info) -> Option<[[u32; 2]; 2]> {
+    let [low, high] = covered(frame, info)?;
+    let size = [frame.width, frame.height];
+    let high = [0, 1].map(|c| high[c].next_multiple_of(SQUARE).min(size[c]));
+    Some([low.map(|l| l / SQUARE * SQUARE), high])
 }
 
 #[cfg(test)]

@@ -25,6 +25,8 @@ pub struct Rendered {
 pub struct Counters {
     /// Sub-pixel rays.
     pub rays: u64,
+    /// Of these, the ones too far beside the object's bounding box to be looked at.
+    pub rays_skipped: u64,
     /// Rays that run through the inside of the mesh.
     pub rays_hit: u64,
     /// Inside pieces beyond the fourth of their ray: not drawn.
@@ -47,6 +49,7 @@ impl Counters {
     pub fn merge(self, other: Self) -> Self {
         Self {
             rays: self.rays + other.rays,
+            rays_skipped: self.rays_skipped + other.rays_skipped,
             rays_hit: self.rays_hit + other.rays_hit,
             pieces_dropped: self.pieces_dropped + other.pieces_dropped,
             splats: self.splats + other.splats,

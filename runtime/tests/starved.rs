@@ -12,11 +12,11 @@ use glam::DVec3;
 use std::path::Path;
 use std::process::{Command, Output};
 
-/// The ball from the side, one ray a pixel: 417 MB of state.
+/// The ball, which fills the picture, one ray a pixel: 417 MB of state.
 fn scene(centre: DVec3) -> String {
     let at = |x: f64, y: f64, z: f64| (centre + DVec3::new(x, y, z)).to_array();
     format!(
-        "[camera]\nposition = {:?}\ntarget = {:?}\nvertical_fov_degrees = 28\n[image]\nwidth = 1600\nheight = 1200\n\
+        "[camera]\nposition = {:?}\ntarget = {:?}\nvertical_fov_degrees = 16\n[image]\nwidth = 1600\nheight = 1200\n\
          samples_per_pixel = 1\n[[lights]]\ntype = \"point\"\nposition = {:?}\nintensity = [20, 20, 20]\n",
         at(0.4, 0.6, 4.6),
         at(0.0, 0.0, 0.0),

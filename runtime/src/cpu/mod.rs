@@ -11,6 +11,7 @@ use crate::Result;
 use crate::exact::ExactDepths;
 use crate::fold::{LightingKey, Plan};
 use crate::frame::Frame;
+use crate::placement::covered_squares;
 use crate::rendered::{Counters, RayResult, Rendered};
 use crate::usable::{MOST_EXTINCTION, largest_extinction, usable_samples};
 use block::{Block, Shared};
@@ -111,7 +112,8 @@ impl CpuRenderer {
         let kernels = tiles::kernels(&self.cloud, frame.view.origin);
         let shared =
             Shared { renderer: self, frame, sources: &sources, kernels: &kernels, offsets: &offsets };
-        let rects = Rect::all(frame).split(BLOCK);
+        let seen = covered_squares(frame, &self.info).map(|[low, high]| Rect { low, high });
+        let rects = seen.map_or(Vec::new(), |rect| rect.split(BLOCK));
         let blocks: Vec<Block> =
             rects.into_par_iter().with_max_len(1).map(|rect| shared.draw(rect)).collect();
         let wall = milliseconds(started);
@@ -128,6 +130,8 @@ impl CpuRenderer {
             (0..3).for_each(|k| seconds[k] += block.seconds[k]);
         }
         picture.coverage = Some(coverage);
+        let rays = (picture.pixels.len() * offsets.len()) as u64;
+        counters = Counters { rays, rays_skipped: rays - counters.rays, ..counters };
         // The ray passes run interleaved on all threads: each gets its share of the time that passed on the clock.
         let all = seconds.iter().sum::<f64>().max(f64::MIN_POSITIVE);
         let share = |k: usize| wall * seconds[k] / all;

@@ -10,6 +10,7 @@
 //! together so that each ray runs through contiguous memory.
 
 use crate::frame::{Frame, View};
+use crate::placement::SQUARE;
 use diaphane_formats::hits::{Hit, Hits, LANES, Lanes};
 use diaphane_formats::kernel::{CUT_OFF, CUT_OFF_RADIUS};
 use diaphane_formats::reconstruct::Cloud;
@@ -17,7 +18,7 @@ use diaphane_formats::slopes::Source;
 use glam::Vec3;
 
 /// Side of a block of tiles, pixels.
-pub const BLOCK: u32 = 32;
+pub const BLOCK: u32 = SQUARE;
 
 /// Side of a tile, pixels.
 pub const TILE: u32 = 4;

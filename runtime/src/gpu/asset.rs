@@ -223,6 +223,13 @@ impl AssetBuffers {
         PixelState { fresnel: self.fresnel, heterogeneous: self.heterogeneous }
     }
 
+    /// Whether another asset's passes are compiled with the same constants, its [`Variant`] aside.
+    pub fn compiles_as(&self, asset: &Asset) -> bool {
+        let boundary_order = asset.info.boundary_order as usize;
+        (self.fresnel, self.boundary_order, self.heterogeneous)
+            == (asset.info.ior != 1.0, boundary_order, asset.density.is_some())
+    }
+
     /// The code that the material needs.
     pub fn variant(&self) -> Variant {
         Variant {

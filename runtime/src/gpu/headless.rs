@@ -9,6 +9,7 @@ use super::tiles::Tile;
 use super::timers::{PASSES, Pass, Timers};
 use crate::exact::ExactDepths;
 use crate::frame::Frame;
+use crate::placement::covered_squares;
 use crate::rendered::{Counters, MAX_PIECES, RayResult, Rendered};
 use crate::{Error, Result};
 use diaphane_formats::asset::{Asset, Info};
@@ -116,7 +117,9 @@ impl GpuRenderer {
             ..Counters::default()
         };
         let per_ray = 1.0 / offsets.len() as f32;
+        let mut traced = 0;
         let milliseconds = self.draw(frame, exact, &offsets, |tile, data| {
+            traced += tile.pixels() * offsets.len() as u64;
             for (i, (sum, counts)) in data.radiance.iter().zip(data.counters).enumerate() {
                 let at = data.place(tile, i, frame.width);
                 picture.pixels[at] = [sum[0] * per_ray, sum[1] * per_ray, sum[2] * per_ray];
@@ -128,6 +131,7 @@ impl GpuRenderer {
             }
         })?;
         picture.coverage = Some(coverage);
+        counters.rays_skipped = counters.rays - traced;
         let mut passes = Pass::named(&milliseconds);
         if passes.is_empty() {
             passes.push(("frame", started.elapsed().as_secs_f64() * 1e3));
@@ -208,7 +212,9 @@ impl GpuRenderer {
         mut take: impl FnMut(Tile, TileData),
     ) -> Result<[f64; PASSES]> {
         let GpuDevice { device, queue, .. } = &self.owned;
-        let tiles = self.renderer.begin(device, queue, frame, exact)?;
+        // Out of sight one pixel is drawn none the less, so that the sources are there.
+        let area = covered_squares(frame, &self.renderer.asset.info).unwrap_or([[0; 2], [1; 2]]);
+        let tiles = self.renderer.begin(device, queue, frame, exact, area)?;
         self.tiles = tiles.len();
         let submissions = offsets.len() as u64 + 1;
         if self.timers.capacity() < submissions {

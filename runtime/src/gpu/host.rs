@@ -198,7 +198,15 @@ impl Renderer {
     /// # Errors
     /// An asset that makes no sense or is too large for the device.
     pub fn add_asset(&mut self, device: &Device, asset: &Asset) -> Result<AssetId> {
-        let all = Pipeline::new(device, asset, self.path)?;
+        // Nothing is compiled that an asset of the same kind has.
+        let known = self.assets.iter().flatten().find_map(|l| {
+            let all = l.pipelines.first()?;
+            all.asset.compiles_as(asset).then_some(all)
+        });
+        let all = match known {
+            Some(all) => all.level(device, asset)?,
+            None => Pipeline::new(device, asset, self.path)?,
+        };
         let coarser = (1..asset.level_sizes().len())
             .map(|k| all.level(device, &asset.level(k)?))
             .collect::<Result<Vec<_>>>()?;

@@ -192,24 +192,27 @@ impl Pipeline {
         self.set_material(device, queue, info);
     }
 
-    /// Uploads a frame's lights, and sees that there are targets for its tiles, which it returns.
+    /// Uploads a frame's lights, and sees that there are targets for the tiles of `area` (first column and row, and those behind
+    /// the last), which it returns.
     pub(super) fn begin(
         &mut self,
         device: &Device,
         queue: &Queue,
         frame: &Frame,
         exact: Option<&ExactDepths>,
+        area: [[u32; 2]; 2],
     ) -> Result<Vec<Tile>> {
         let key = self.light(device, queue, frame, exact)?;
-        let mut tiles = self.split(device, frame)?;
+        let mut tiles = self.split(device, area)?;
         // The first tile is the largest; `split` returns at least one.
-        let fits = self.targets.as_ref().is_some_and(|(t, _)| t.size == tiles[0].size);
+        let size = tiles[0].size;
+        let fits = self.targets.as_ref().is_some_and(|(t, _)| (0..2).all(|c| t.size[c] >= size[c]));
         if !fits || self.frame.take_changed() {
             let mut old = self.targets.take().map(|(t, _)| t).filter(|_| fits);
             let targets = loop {
                 let made = old.take().map_or_else(|| self.allocate(device, tiles[0]), Ok);
                 match made {
-                    Err(Error::GpuMemory(what)) if self.shrink(&what) => tiles = self.split(device, frame)?,
+                    Err(Error::GpuMemory(what)) if self.shrink(&what) => tiles = self.split(device, area)?,
                     made => break made?,
                 }
             };
@@ -220,8 +223,11 @@ impl Pipeline {
         Ok(tiles)
     }
 
-    fn split(&self, device: &Device, frame: &Frame) -> Result<Vec<Tile>> {
-        split(frame.width, frame.height, budget(device, self.asset.pixel_state(), self.most_memory))
+    fn split(&self, device: &Device, [low, high]: [[u32; 2]; 2]) -> Result<Vec<Tile>> {
+        let budget = budget(device, self.asset.pixel_state(), self.most_memory);
+        let mut tiles = split(high[0] - low[0], high[1] - low[1], budget)?;
+        tiles.iter_mut().for_each(|t| t.start = [t.start[0] + low[0], t.start[1] + low[1]]);
+        Ok(tiles)
     }
 
     fn allocate(&mut self, device: &Device, tile: Tile) -> Result<Targets> {

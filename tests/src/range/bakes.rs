@@ -46,6 +46,7 @@ pub fn bake_body(body: &Body, placed: &Placed, params: &Params, progress: &dyn P
 pub fn dye(asset: &mut Asset, material: &Material) {
     asset.info.albedo = material.albedo;
     asset.info.phase = material.phase;
-    // It was measured with another material.
+    // They were measured with another material.
     asset.info.certificate = None;
+    asset.levels.iter_mut().for_each(|level| level.error = None);
 }
