@@ -7,6 +7,7 @@ use diaphane_formats::directions::subpixel_offsets;
 use diaphane_formats::harmonics::Coefficients;
 use diaphane_formats::phase::Phase;
 use diaphane_formats::scene::{Light, Scene};
+use diaphane_runtime::cpu::CpuRenderer;
 use diaphane_runtime::frame::Frame;
 use diaphane_runtime::player::{Backend, LightMode, Player};
 use diaphane_runtime::rendered::Rendered;
@@ -176,4 +177,26 @@ fn reuse_skips_every_pass_of_an_unchanged_frame() {
     let second = player.render(&frame, LightMode::Exact).unwrap();
     assert!(!first.passes.is_empty() && second.passes.is_empty());
     assert_eq!(first.picture, second.picture);
+}
+
+#[test]
+fn pixels_beside_the_ball_are_skipped_and_counted() {
+    let asset = ball(0.2, HERE, Phase::Isotropic);
+    let mut scene = scene(HERE, 320, 1, side_light());
+    scene.camera.position = HERE + 4.0 * (scene.camera.position - HERE);
+    let renderer = CpuRenderer::new(&asset).unwrap();
+    // The ball in the middle, at a corner, half outside, and out of sight.
+    for (aside, least, most) in [(0.0, 0.5, 0.95), (2.4, 0.5, 0.95), (3.2, 0.6, 1.0), (9.0, 1.0, 1.0)] {
+        scene.camera.target = HERE + DVec3::new(aside, 0.8 * aside, 0.0);
+        let frame = Frame::new(&scene, &asset.info).unwrap();
+        let rendered = draw(&asset, &scene, LightMode::Baked);
+        let share = rendered.counters.rays_skipped as f64 / rendered.counters.rays as f64;
+        assert!((least..=most).contains(&share), "{aside}: {share}");
+        assert_eq!(rendered.counters.rays, 320 * 320);
+        // Every ray traced on its own.
+        let rays = renderer.trace_rays(&frame, &renderer.sources(&frame, None), subpixel_offsets(1)[0]);
+        let hit = rays.iter().filter(|ray| ray.count > 0).count() as u64;
+        assert_eq!((rendered.counters.rays_hit, hit == 0), (hit, share == 1.0), "{aside}");
+        assert!(rays.iter().zip(&rendered.picture.pixels).all(|(ray, pixel)| ray.radiance == *pixel));
+    }
 }
