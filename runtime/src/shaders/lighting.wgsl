@@ -82,28 +82,26 @@ fn stored(order: vec2u, d: vec3f) -> vec2f {
     var sin_m = 0.0;
     let most = max(order.x, order.y);
     for (var m = 0u; m < most; m++) {
-        let scale = select(1.4142135, 1.0, m == 0u);
         var walk = sh_start(m, cos_m, sin_m);
+        // Factors of cos and sin; where m is 0 both are the same and the sine is 0.
+        var even = vec2f(0.0);
+        var odd = vec2f(0.0);
         for (var l = m; l < most; l++) {
             if (l > m) {
                 walk = sh_next(walk, l, m, d.z);
             }
             let centre = l * (l + 1u);
-            let even = scale * walk.current * cos_m;
-            let odd = scale * walk.current * sin_m;
-            if (l < order.x) {
-                sum.x += of_depth[centre + m] * even;
-                if (m > 0u) {
-                    sum.x += of_depth[centre - m] * odd;
-                }
+            if (!FRESNEL || l < order.x) {
+                even.x += of_depth[centre + m] * walk.current;
+                odd.x += of_depth[centre - m] * walk.current;
             }
             if (FRESNEL && l < order.y) {
-                sum.y += of_boundary[centre + m] * even;
-                if (m > 0u) {
-                    sum.y += of_boundary[centre - m] * odd;
-                }
+                even.y += of_boundary[centre + m] * walk.current;
+                odd.y += of_boundary[centre - m] * walk.current;
             }
         }
+        let scale = select(1.4142135, 1.0, m == 0u);
+        sum += scale * (even * cos_m + odd * sin_m);
         let next = d.x * cos_m - d.y * sin_m;
         sin_m = d.x * sin_m + d.y * cos_m;
         cos_m = next;
