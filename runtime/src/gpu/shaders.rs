@@ -13,7 +13,7 @@ pub(super) const SEGMENTS: &str = source!("shared/view", "shared/medium", "segme
 pub(super) const PROFILE: &str =
     source!("shared/view", "shared/medium", "shared/profile", "shared/density", "profile");
 pub(super) const LIGHTING: &str =
-    source!("shared/view", "shared/medium", "shared/light", "shared/phase", "shared/sh", "lighting");
+    source!("shared/view", "shared/medium", "shared/light", "shared/phase", "lighting");
 pub(super) const FOLD: &str = source!("shared/view", "shared/medium", "fold");
 pub(super) const SLOPES: &str = source!("shared/view", "shared/medium", "slopes");
 pub(super) const OUTLINES: &str = source!("shared/view", "shared/medium", "shared/kernel", "outlines");

@@ -29,6 +29,7 @@ struct Band {
 
 // Most coefficients of a sample.
 const MOST: u32 = 196u;
+const SH_MAX_ORDER: u32 = 14u;
 
 // Coefficients of the sample at hand; those of bands that it lacks are neither written nor read.
 var<private> of_depth: array<f32, MOST>;
@@ -75,33 +76,56 @@ fn decode_boundary(start: u32, scale: f32) {
     }
 }
 
-// Stored functions of optical depth and of the boundary in one direction.
-fn stored(order: vec2u, d: vec3f) -> vec2f {
-    var sum = vec2f(0.0);
-    var cos_m = 1.0;
-    var sin_m = 0.0;
+// Unit vectors towards lights that are looked up together: coefficients are fetched once for all of them.
+struct Towards {
+    x: vec4f,
+    y: vec4f,
+    z: vec4f,
+}
+
+// Stored functions in these directions.
+struct Stored {
+    depth: vec4f,
+    boundary: vec4f,
+}
+
+// By recurrence over the bands of every order m, as in formats/src/sh.rs. `recurrence` holds for each l * SH_MAX_ORDER + m the
+// constants (a, b), or the diagonal where l = m.
+fn stored(order: vec2u, d: Towards) -> Stored {
+    var sum = Stored(vec4f(0.0), vec4f(0.0));
+    var cos_m = vec4f(1.0);
+    var sin_m = vec4f(0.0);
     let most = max(order.x, order.y);
     for (var m = 0u; m < most; m++) {
-        var walk = sh_start(m, cos_m, sin_m);
+        var before = vec4f(0.0);
+        var current = vec4f(recurrence[m * SH_MAX_ORDER + m].x);
         // Factors of cos and sin; where m is 0 both are the same and the sine is 0.
-        var even = vec2f(0.0);
-        var odd = vec2f(0.0);
+        var even = vec4f(0.0);
+        var odd = vec4f(0.0);
+        var boundary_even = vec4f(0.0);
+        var boundary_odd = vec4f(0.0);
         for (var l = m; l < most; l++) {
             if (l > m) {
-                walk = sh_next(walk, l, m, d.z);
+                let c = recurrence[l * SH_MAX_ORDER + m].xy;
+                let next = c.x * (d.z * current - c.y * before);
+                before = current;
+                current = next;
             }
             let centre = l * (l + 1u);
             if (!FRESNEL || l < order.x) {
-                even.x += of_depth[centre + m] * walk.current;
-                odd.x += of_depth[centre - m] * walk.current;
+                even += of_depth[centre + m] * current;
+                odd += of_depth[centre - m] * current;
             }
             if (FRESNEL && l < order.y) {
-                even.y += of_boundary[centre + m] * walk.current;
-                odd.y += of_boundary[centre - m] * walk.current;
+                boundary_even += of_boundary[centre + m] * current;
+                boundary_odd += of_boundary[centre - m] * current;
             }
         }
         let scale = select(1.4142135, 1.0, m == 0u);
-        sum += scale * (even * cos_m + odd * sin_m);
+        sum.depth += scale * (even * cos_m + odd * sin_m);
+        if (FRESNEL) {
+            sum.boundary += scale * (boundary_even * cos_m + boundary_odd * sin_m);
+        }
         let next = d.x * cos_m - d.y * sin_m;
         sin_m = d.x * sin_m + d.y * cos_m;
         cos_m = next;
@@ -160,26 +184,39 @@ fn light_samples(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgrou
         sum = earlier.xyz;
     }
     let end = min(first + PORTION, view.light_count);
+    // Lights whose depths are looked up, until there are enough of them.
+    var waiting = 0u;
+    var towards = Towards(vec4f(0.0), vec4f(0.0), vec4f(0.0));
+    var brought: array<vec3f, 4>;
     for (var l = first; l < end; l++) {
         let light = lights[l];
         let arriving = incident(light, x);
-        if (all(arriving.irradiance == vec3f(0.0))) {
-            continue;
-        }
-        var psi: vec3f;
-        if (light.table != NO_TABLE) {
-            let known = exact[light.table * medium.samples + sample];
-            psi = exp(-medium.extinction * known.x) * known.y;
-        } else {
-            let value = stored(order, arriving.towards);
-            psi = transmittance(value.x + max(dot(lobe, arriving.towards), 0.0));
-            if (FRESNEL) {
-                psi *= clamp(value.y, 0.0, 1.0);
+        if (any(arriving.irradiance != vec3f(0.0))) {
+            let g = clamp(medium.mean_cosine, -light.most_cosine, light.most_cosine);
+            let scattered = arriving.irradiance * henyey_greenstein(g, -arriving.towards, towards_camera);
+            if (light.table != NO_TABLE) {
+                let known = exact[light.table * medium.samples + sample];
+                sum += scattered * exp(-medium.extinction * known.x) * known.y;
+            } else {
+                towards.x[waiting] = arriving.towards.x;
+                towards.y[waiting] = arriving.towards.y;
+                towards.z[waiting] = arriving.towards.z;
+                brought[waiting] = scattered;
+                waiting++;
             }
         }
-        let g = clamp(medium.mean_cosine, -light.most_cosine, light.most_cosine);
-        let phase = henyey_greenstein(g, -arriving.towards, towards_camera);
-        sum += arriving.irradiance * psi * phase;
+        if (waiting == 4u || (waiting > 0u && l + 1u == end)) {
+            let value = stored(order, towards);
+            let by_lobe = max(lobe.x * towards.x + lobe.y * towards.y + lobe.z * towards.z, vec4f(0.0));
+            for (var k = 0u; k < waiting; k++) {
+                var psi = transmittance(value.depth[k] + by_lobe[k]);
+                if (FRESNEL) {
+                    psi *= clamp(value.boundary[k], 0.0, 1.0);
+                }
+                sum += brought[k] * psi;
+            }
+            waiting = 0u;
+        }
     }
     if (end < view.light_count) {
         values[sample] = vec4f(sum, f32(end));
