@@ -15,6 +15,7 @@
 
 mod asset;
 mod bindings;
+mod census;
 mod corners;
 mod device;
 mod faults;
@@ -29,6 +30,7 @@ mod pipeline;
 mod readback;
 pub mod rivals;
 mod shaders;
+mod shard;
 mod targets;
 mod tiles;
 mod timers;

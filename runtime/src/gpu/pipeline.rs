@@ -3,6 +3,7 @@
 use super::asset::AssetBuffers;
 use super::frame::{FrameBuffers, VIEW_STRIDE, common_layout};
 use super::passes::Recorder;
+use super::passes::batches::Batches;
 use super::passes::boundary::Boundary;
 use super::passes::clip::Clip;
 use super::passes::fold::Fold;
@@ -15,6 +16,7 @@ use super::passes::segments::Segments;
 use super::passes::slopes::Slopes;
 use super::passes::splat::Splat;
 use super::passes::surface::Surface;
+use super::shard::Shard;
 use super::targets::{COUNTERS, LEAST, RADIANCE, TOTAL, Targets, budget};
 use super::tiles::{Tile, split};
 use super::timers::Timers;
@@ -37,6 +39,8 @@ pub(super) struct Pipeline {
     boundary: Option<Boundary>,
     segments: Segments,
     profile: Option<Profile>,
+    outlines: Outlines,
+    batches: Batches,
     splatting: Splatting,
     pub(super) asset: AssetBuffers,
     frame: FrameBuffers,
@@ -95,30 +99,40 @@ impl SplatPath {
 /// The passes of a [`SplatPath`].
 #[derive(Clone)]
 enum Splatting {
-    Quads(Outlines, Splat, Resolve),
-    Tiles(Gather),
+    Quads(Splat, Resolve),
+    /// The second where sums are kept from shard to shard.
+    Tiles(Gather, Option<Resolve>),
 }
 
-/// The groups of all passes.
+impl Splatting {
+    fn new(device: &Device, common: &BindGroupLayout, asset: &AssetBuffers, path: SplatPath) -> Self {
+        let resolve = || Resolve::new(device, common, asset);
+        match path {
+            SplatPath::Quads => Self::Quads(Splat::new(device, common, asset), resolve()),
+            SplatPath::Tiles => {
+                Self::Tiles(Gather::new(device, common, asset), asset.pixel_state().kept.then(resolve))
+            }
+        }
+    }
+}
+
+/// The groups of all passes; those that mind samples have one for each shard.
 struct Groups {
-    lighting: BindGroup,
-    fold: BindGroup,
-    slopes: BindGroup,
+    lighting: Vec<BindGroup>,
+    fold: Vec<BindGroup>,
+    slopes: Vec<BindGroup>,
     surface: BindGroup,
     boundary: Option<BindGroup>,
     segments: BindGroup,
-    outlines: Option<BindGroup>,
+    outlines: Vec<BindGroup>,
+    batches: Vec<BindGroup>,
     pieces: Vec<PieceGroups>,
 }
 
 struct PieceGroups {
     profile: Option<BindGroup>,
-    splatting: SplattingGroups,
-}
-
-enum SplattingGroups {
-    Quads { splat: BindGroup, resolve: BindGroup },
-    Tiles(BindGroup),
+    splat: Vec<BindGroup>,
+    resolve: Option<BindGroup>,
 }
 
 impl Pipeline {
@@ -138,14 +152,9 @@ impl Pipeline {
             boundary: asset.fresnel.then(|| Boundary::new(device, &common)),
             segments: Segments::new(device, &common, &asset),
             profile: asset.heterogeneous.then(|| Profile::new(device, &common)),
-            splatting: match path {
-                SplatPath::Quads => Splatting::Quads(
-                    Outlines::new(device, &common),
-                    Splat::new(device, &common, &asset),
-                    Resolve::new(device, &common, &asset),
-                ),
-                SplatPath::Tiles => Splatting::Tiles(Gather::new(device, &common, &asset)),
-            },
+            outlines: Outlines::new(device, &common, path),
+            batches: Batches::new(device, &common, path),
+            splatting: Splatting::new(device, &common, &asset, path),
             frame: FrameBuffers::new(device, &common, &asset),
             common,
             asset,
@@ -162,7 +171,7 @@ impl Pipeline {
     pub(super) fn path(&self) -> SplatPath {
         match self.splatting {
             Splatting::Quads(..) => SplatPath::Quads,
-            Splatting::Tiles(_) => SplatPath::Tiles,
+            Splatting::Tiles(..) => SplatPath::Tiles,
         }
     }
 
@@ -177,8 +186,8 @@ impl Pipeline {
     fn renew_variant(&mut self, device: &Device) {
         let variant = self.asset.variant();
         match &mut self.splatting {
-            Splatting::Quads(_, splat, _) => splat.set_variant(device, variant),
-            Splatting::Tiles(gather) => gather.set_variant(device, variant),
+            Splatting::Quads(splat, _) => splat.set_variant(device, variant),
+            Splatting::Tiles(gather, _) => gather.set_variant(device, variant),
         }
     }
 
@@ -275,7 +284,12 @@ impl Pipeline {
     /// As [`Self::new`].
     pub(super) fn level(&self, device: &Device, asset: &Asset) -> Result<Self> {
         let mut level = self.with(device, AssetBuffers::allocate(device, asset, self.path())?);
-        level.renew_variant(device);
+        if level.asset.pixel_state().kept == self.asset.pixel_state().kept {
+            level.renew_variant(device);
+        } else {
+            // Another number of shards.
+            level.splatting = Splatting::new(device, &level.common, &level.asset, level.path());
+        }
         Ok(level)
     }
 
@@ -289,6 +303,8 @@ impl Pipeline {
             boundary: self.boundary.clone(),
             segments: self.segments.clone(),
             profile: self.profile.clone(),
+            outlines: self.outlines.clone(),
+            batches: self.batches.clone(),
             splatting: self.splatting.clone(),
             frame: FrameBuffers::new(device, &self.common, &asset),
             reuse: true,
@@ -393,6 +409,7 @@ impl Pipeline {
         for (buffer, bytes) in [(&targets.radiance, RADIANCE), (&targets.counters, COUNTERS)] {
             encoder.clear_buffer(buffer, 0, Some(bytes * tile.pixels()));
         }
+        encoder.clear_buffer(&targets.census, 0, None);
     }
 
     /// Records one ray of every pixel of a tile, added to the picture.
@@ -416,49 +433,51 @@ impl Pipeline {
         if let Some((clip, group)) = clip {
             clip.record(r, group);
         }
-        if let (Splatting::Quads(outlines, ..), Some(group)) = (&self.splatting, &groups.outlines) {
-            outlines.record(r, group, &self.asset);
-        }
+        self.outlines.record(r, &groups.outlines, &self.asset);
+        self.batches.record(r, &groups.batches, &self.asset);
         for (k, piece) in groups.pieces.iter().enumerate() {
             if let (Some(profile), Some(group)) = (&self.profile, &piece.profile) {
                 profile.record(r, group, targets, k);
             }
-            match (&self.splatting, &piece.splatting) {
-                (Splatting::Quads(_, quads, end), SplattingGroups::Quads { splat, resolve }) => {
-                    quads.record(r, splat, targets, k);
-                    end.record(r, resolve, targets, k);
+            let resolve = match &self.splatting {
+                Splatting::Quads(quads, resolve) => {
+                    quads.record(r, &piece.splat, &self.asset, targets, k);
+                    Some(resolve)
                 }
-                (Splatting::Tiles(gather), SplattingGroups::Tiles(group)) => {
-                    gather.record(r, group, targets, k);
+                Splatting::Tiles(gather, resolve) => {
+                    gather.record(r, &piece.splat, targets, k);
+                    resolve.as_ref()
                 }
-                _ => {}
+            };
+            if let (Some(resolve), Some(group)) = (resolve, &piece.resolve) {
+                resolve.record(r, group, targets, k);
             }
         }
     }
 
     fn groups(&self, device: &Device, targets: &Targets) -> Groups {
         let (asset, frame) = (&self.asset, &self.frame);
+        let each = |bind: &dyn Fn(&Shard) -> BindGroup| asset.shards.iter().map(bind).collect::<Vec<_>>();
         let piece = |k: usize| PieceGroups {
             profile: self.profile.as_ref().map(|p| p.bind(device, asset, targets, k)),
-            splatting: match &self.splatting {
-                Splatting::Quads(_, splat, resolve) => SplattingGroups::Quads {
-                    splat: splat.bind(device, asset, targets, k),
-                    resolve: resolve.bind(device, targets, k),
-                },
-                Splatting::Tiles(gather) => SplattingGroups::Tiles(gather.bind(device, asset, targets, k)),
+            splat: match &self.splatting {
+                Splatting::Quads(splat, _) => each(&|s| splat.bind(device, s, targets, k)),
+                Splatting::Tiles(gather, _) => each(&|s| gather.bind(device, s, targets, k)),
+            },
+            resolve: match &self.splatting {
+                Splatting::Quads(_, resolve) => Some(resolve.bind(device, targets, k)),
+                Splatting::Tiles(_, resolve) => resolve.as_ref().map(|r| r.bind(device, targets, k)),
             },
         };
         Groups {
-            lighting: self.lighting.bind(device, asset, frame),
-            fold: self.fold.bind(device, asset, frame),
-            slopes: self.slopes.bind(device, asset),
+            lighting: each(&|s| self.lighting.bind(device, asset, s, frame)),
+            fold: each(&|s| self.fold.bind(device, asset, s, frame)),
+            slopes: each(&|s| self.slopes.bind(device, asset, s)),
             surface: self.surface.bind(device, asset, targets),
             boundary: self.boundary.as_ref().map(|b| b.bind(device, asset, frame, targets)),
             segments: self.segments.bind(device, targets),
-            outlines: match &self.splatting {
-                Splatting::Quads(outlines, ..) => Some(outlines.bind(device, asset, targets)),
-                Splatting::Tiles(_) => None,
-            },
+            outlines: each(&|s| self.outlines.bind(device, s, targets)),
+            batches: each(&|s| self.batches.bind(device, s, targets)),
             pieces: (0..MAX_PIECES).map(piece).collect(),
         }
     }

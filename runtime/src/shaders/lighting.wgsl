@@ -136,7 +136,7 @@ fn light_samples(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgrou
     }
     let weight = weights[sample];
     if (weight <= 0.0) {
-        values[sample] = vec4f(0.0);
+        values[medium.first + sample] = vec4f(0.0);
         return;
     }
     let x = centroids[sample].xyz;
@@ -157,7 +157,7 @@ fn light_samples(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgrou
     var first = 0u;
     var sum = vec3f(0.0);
     if (view.light_count > PORTION) {
-        let earlier = values[sample];
+        let earlier = values[medium.first + sample];
         first = u32(earlier.w);
         sum = earlier.xyz;
     }
@@ -170,7 +170,7 @@ fn light_samples(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgrou
         }
         var psi: vec3f;
         if (light.table != NO_TABLE) {
-            let known = exact[light.table * medium.samples + sample];
+            let known = exact[light.table * medium.total + medium.first + sample];
             psi = exp(-medium.extinction * known.x) * known.y;
         } else {
             let value = stored(order, arriving.towards);
@@ -184,8 +184,8 @@ fn light_samples(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgrou
         sum += arriving.irradiance * psi * phase;
     }
     if (end < view.light_count) {
-        values[sample] = vec4f(sum, f32(end));
+        values[medium.first + sample] = vec4f(sum, f32(end));
         return;
     }
-    values[sample] = vec4f(min(medium.albedo * sum, vec3f(most_source())), weight);
+    values[medium.first + sample] = vec4f(min(medium.albedo * sum, vec3f(most_source())), weight);
 }
