@@ -3,8 +3,9 @@
 use super::census;
 use super::device::{GpuDevice, instance};
 use super::faults::wait;
-use super::pipeline::{Pipeline, SplatPath};
+use super::pipeline::Pipeline;
 use super::readback;
+use super::splatting::SplatPath;
 use super::targets::{CENSUS, Targets};
 use super::tiles::Tile;
 use super::timers::{PASSES, Pass, Timers};

@@ -7,16 +7,15 @@ use super::passes::batches::Batches;
 use super::passes::boundary::Boundary;
 use super::passes::clip::Clip;
 use super::passes::fold::Fold;
-use super::passes::gather::Gather;
 use super::passes::lighting::Lighting;
 use super::passes::outlines::Outlines;
 use super::passes::profile::Profile;
-use super::passes::resolve::Resolve;
 use super::passes::segments::Segments;
 use super::passes::slopes::Slopes;
-use super::passes::splat::Splat;
 use super::passes::surface::Surface;
 use super::shard::Shard;
+pub(super) use super::splatting::SplatPath;
+use super::splatting::Splatting;
 use super::targets::{COUNTERS, LEAST, RADIANCE, TOTAL, Targets, budget};
 use super::tiles::{Tile, split};
 use super::timers::Timers;
@@ -27,7 +26,7 @@ use crate::frame::Frame;
 use crate::rendered::MAX_PIECES;
 use crate::{Error, Result};
 use diaphane_formats::asset::{Asset, Info};
-use wgpu::{BindGroup, BindGroupLayout, CommandEncoder, Device, DeviceType, Features, Queue};
+use wgpu::{BindGroup, BindGroupLayout, CommandEncoder, Device, Queue};
 
 /// The passes, their buffers and their order.
 pub(super) struct Pipeline {
@@ -55,65 +54,6 @@ pub(super) struct Pipeline {
     pub(super) most_memory: u64,
     /// Bytes that the latest targets take, about.
     tile_memory: u64,
-}
-
-/// How kernels are summed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum SplatPath {
-    /// A quad for each kernel, blended into textures of f32: needs `FLOAT32_BLENDABLE`.
-    Quads,
-    /// Every tile of 8 × 8 pixels gathers its kernels in registers.
-    Tiles,
-}
-
-impl SplatPath {
-    /// The one that a device draws with unless it is told otherwise: tiles need no feature beyond those of every adapter and
-    /// were faster wherever both were measured. Software adapters take quads where they can: Mesa 22.3.6's keeps the memory
-    /// of every dispatch whose workgroups have barriers, 4 MB a ray by tiles and 0.02 MB by quads.
-    pub fn best(device: &Device) -> Self {
-        let software = device.adapter_info().device_type == DeviceType::Cpu;
-        let quads = software && device.features().contains(Features::FLOAT32_BLENDABLE);
-        if quads { Self::Quads } else { Self::Tiles }
-    }
-
-    /// Itself where the device can take it.
-    ///
-    /// # Errors
-    /// Quads where 32-bit floats cannot be blended.
-    pub fn checked(self, device: &Device) -> Result<Self> {
-        if self == Self::Quads && !device.features().contains(Features::FLOAT32_BLENDABLE) {
-            return Err(Error::Gpu("the adapter cannot blend 32-bit floats, which quads need".to_owned()));
-        }
-        Ok(self)
-    }
-
-    /// "quads" or "tiles".
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Quads => "quads",
-            Self::Tiles => "tiles",
-        }
-    }
-}
-
-/// The passes of a [`SplatPath`].
-#[derive(Clone)]
-enum Splatting {
-    Quads(Splat, Resolve),
-    /// The second where sums are kept from shard to shard.
-    Tiles(Gather, Option<Resolve>),
-}
-
-impl Splatting {
-    fn new(device: &Device, common: &BindGroupLayout, asset: &AssetBuffers, path: SplatPath) -> Self {
-        let resolve = || Resolve::new(device, common, asset);
-        match path {
-            SplatPath::Quads => Self::Quads(Splat::new(device, common, asset), resolve()),
-            SplatPath::Tiles => {
-                Self::Tiles(Gather::new(device, common, asset), asset.pixel_state().kept.then(resolve))
-            }
-        }
-    }
 }
 
 /// The groups of all passes; those that mind samples have one for each shard.
@@ -169,10 +109,7 @@ impl Pipeline {
 
     /// How kernels are summed.
     pub(super) fn path(&self) -> SplatPath {
-        match self.splatting {
-            Splatting::Quads(..) => SplatPath::Quads,
-            Splatting::Tiles(..) => SplatPath::Tiles,
-        }
+        self.splatting.path()
     }
 
     /// Takes extinction and albedo from an edited asset's parameters.
@@ -184,11 +121,7 @@ impl Pipeline {
 
     /// Compiles what the material needs and is not there.
     fn renew_variant(&mut self, device: &Device) {
-        let variant = self.asset.variant();
-        match &mut self.splatting {
-            Splatting::Quads(splat, _) => splat.set_variant(device, variant),
-            Splatting::Tiles(gather, _) => gather.set_variant(device, variant),
-        }
+        self.splatting.set_variant(device, self.asset.variant());
     }
 
     /// The same for one instance, whose medium others share until now.
@@ -439,19 +372,7 @@ impl Pipeline {
             if let (Some(profile), Some(group)) = (&self.profile, &piece.profile) {
                 profile.record(r, group, targets, k);
             }
-            let resolve = match &self.splatting {
-                Splatting::Quads(quads, resolve) => {
-                    quads.record(r, &piece.splat, &self.asset, targets, k);
-                    Some(resolve)
-                }
-                Splatting::Tiles(gather, resolve) => {
-                    gather.record(r, &piece.splat, targets, k);
-                    resolve.as_ref()
-                }
-            };
-            if let (Some(resolve), Some(group)) = (resolve, &piece.resolve) {
-                resolve.record(r, group, targets, k);
-            }
+            self.splatting.record(r, &piece.splat, piece.resolve.as_ref(), &self.asset, targets, k);
         }
     }
 
@@ -460,14 +381,8 @@ impl Pipeline {
         let each = |bind: &dyn Fn(&Shard) -> BindGroup| asset.shards.iter().map(bind).collect::<Vec<_>>();
         let piece = |k: usize| PieceGroups {
             profile: self.profile.as_ref().map(|p| p.bind(device, asset, targets, k)),
-            splat: match &self.splatting {
-                Splatting::Quads(splat, _) => each(&|s| splat.bind(device, s, targets, k)),
-                Splatting::Tiles(gather, _) => each(&|s| gather.bind(device, s, targets, k)),
-            },
-            resolve: match &self.splatting {
-                Splatting::Quads(_, resolve) => Some(resolve.bind(device, targets, k)),
-                Splatting::Tiles(_, resolve) => resolve.as_ref().map(|r| r.bind(device, targets, k)),
-            },
+            splat: each(&|s| self.splatting.bind(device, s, targets, k)),
+            resolve: self.splatting.bind_resolve(device, targets, k),
         };
         Groups {
             lighting: each(&|s| self.lighting.bind(device, asset, s, frame)),

@@ -4,7 +4,7 @@
 
 use super::bindings::{empty_buffer, filled_buffer};
 use super::packed;
-use super::pipeline::SplatPath;
+use super::splatting::SplatPath;
 use super::uniforms::MediumUniform;
 use crate::rendered::MAX_PIECES;
 use diaphane_formats::asset::Samples;

@@ -2,7 +2,7 @@
 
 use super::bindings::empty_buffer;
 use super::faults::allocate;
-use super::pipeline::SplatPath;
+use super::splatting::SplatPath;
 use super::tiles::{Budget, Tile};
 use crate::Result;
 use crate::rendered::MAX_PIECES;

@@ -126,9 +126,9 @@ fn what_is_hidden_is_not_seen() {
         .map(|((x, y), ray)| {
             let direction = frame.view.direction(x as f32 + 0.5, y as f32 + 0.5, frame.width, frame.height);
             hits.clear();
-            for i in 0..cloud.centre.len() {
+            for (i, source) in sources.iter().enumerate() {
                 let centre = cloud.centre[i] - frame.view.origin;
-                let hit = Hit::new(centre, direction, cloud.sharpness[i], cloud.weight[i], &sources[i]);
+                let hit = Hit::new(centre, direction, cloud.sharpness[i], cloud.weight[i], source);
                 hit.into_iter().for_each(|hit| hits.push(hit));
             }
             let (start, end) = ray.pieces[0];

@@ -3,9 +3,9 @@
 
 use super::super::asset::AssetBuffers;
 use super::super::bindings::{Slot, compute, group, layout, pipeline_layout};
-use super::super::pipeline::SplatPath;
 use super::super::shaders;
 use super::super::shard::Shard;
+use super::super::splatting::SplatPath;
 use super::super::targets::Targets;
 use super::super::timers::Pass;
 use super::Recorder;
