@@ -12,7 +12,7 @@
 //! with two more for a window: publish (mean of the rays so far) and display (exposure). [`Renderer`] draws many objects into
 //! a host program's frame, with passes that clip at its depth buffer, compose objects front to back and overlay its picture. Boundary runs where `ior` is not 1, profile where the medium has a density grid. Later pieces of rays are
 //! drawn indirectly and cost next to nothing where no ray has them.
-//! Passes over samples run once for each [`shard`]. [`rivals`] draws the same light in other ways. Sums are kept in 32-bit floats and added in the
+//! Passes over samples run once for each shard (`shard.rs`). [`rivals`] draws the same light in other ways. Sums are kept in 32-bit floats and added in the
 //! order of the samples: the same adapter draws the same bits every time.
 
 mod asset;
