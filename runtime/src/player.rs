@@ -55,6 +55,7 @@ pub struct Player {
     info: Info,
     tracer: DepthTracer,
     reuse: bool,
+    counting: bool,
     last: Option<(Frame, LightMode, Rendered)>,
 }
 
@@ -83,6 +84,7 @@ impl Player {
             info: asset.info.clone(),
             tracer,
             reuse: false,
+            counting: false,
             last: None,
         })
     }
@@ -130,6 +132,22 @@ impl Player {
             Engine::Cpu(cpu) => cpu.set_reuse(reuse),
             Engine::Gpu(gpu) => gpu.set_reuse(reuse),
             Engine::Closed => {}
+        }
+    }
+
+    /// Parts that a GPU's bindings cut the samples into; `None` on the CPU.
+    pub fn shards(&self) -> Option<usize> {
+        match &self.engine {
+            Engine::Cpu(_) | Engine::Closed => None,
+            Engine::Gpu(gpu) => Some(gpu.shards()),
+        }
+    }
+
+    /// Whether [`crate::rendered::Census`] is wanted, which costs the CPU some time; a GPU always takes it. Off at first.
+    pub fn set_counting(&mut self, counting: bool) {
+        self.counting = counting;
+        if let Engine::Cpu(cpu) = &mut self.engine {
+            cpu.set_counting(counting);
         }
     }
 
@@ -240,6 +258,7 @@ impl Player {
         self.engine = engine;
         self.last = None;
         self.set_reuse(self.reuse);
+        self.set_counting(self.counting);
         match &mut self.engine {
             Engine::Cpu(cpu) => cpu.set_material(&self.info),
             Engine::Gpu(gpu) => gpu.set_material(&self.info),

@@ -37,6 +37,69 @@ pub struct Counters {
     pub uncovered: u64,
     /// Samples that can contribute to a picture (positive weight).
     pub samples_drawn: u64,
+    /// What of the object was worth drawing.
+    pub census: Census,
+}
+
+/// Who is in the picture, summed over views. A view is one ray of every pixel of the picture, or of a part of it where it is drawn
+/// in parts. Every sample belongs to one of six classes in every view.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Census {
+    /// Views.
+    pub views: u64,
+    /// Samples without weight.
+    pub samples_dark: u64,
+    /// Samples whose kernels are behind the camera or beside the picture.
+    pub samples_out_of_view: u64,
+    /// Samples whose kernels are so small that they lie between the rays.
+    pub samples_between_rays: u64,
+    /// Samples whose kernels no ray meets inside the object, as far as squares of 8 × 8 pixels tell: beside its outline, or cut off
+    /// by it.
+    pub samples_apart: u64,
+    /// Samples that lie 16 optical depths or more behind where rays enter: none of their light is seen.
+    pub samples_hidden: u64,
+    /// All other samples.
+    pub samples_shown: u64,
+    /// Batches of 64 samples, summed over the pieces that a view has; only where kernels are drawn by quads.
+    pub batches: u64,
+    /// Of these, the ones with a sample that the piece may show: only they are drawn.
+    pub batches_drawn: u64,
+    /// Squares of 16 × 16 pixels.
+    pub tiles: u64,
+    /// Of these, the ones where no ray is inside the object: nothing is gathered there.
+    pub tiles_empty: u64,
+    /// Pieces of rays that are drawn one after the other, [`MAX_PIECES`] a view.
+    pub pieces: u64,
+    /// Of these, the ones that no ray has: their passes do nothing.
+    pub pieces_empty: u64,
+}
+
+impl Census {
+    /// Counts views of a picture of `size` pixels: samples by class in the order above, then for each piece in how many squares
+    /// of 16 × 16 pixels it is, and in how many views.
+    pub fn add(
+        &mut self,
+        views: u64,
+        size: [u32; 2],
+        samples: [u64; 6],
+        tiles: [u64; MAX_PIECES],
+        pieces: [u64; MAX_PIECES],
+    ) {
+        let [dark, out_of_view, between_rays, apart, hidden, shown] = samples;
+        self.views += views;
+        self.samples_dark += dark;
+        self.samples_out_of_view += out_of_view;
+        self.samples_between_rays += between_rays;
+        self.samples_apart += apart;
+        self.samples_hidden += hidden;
+        self.samples_shown += shown;
+        let all_tiles = views * size.map(|n| u64::from(n.div_ceil(16))).iter().product::<u64>();
+        self.tiles += all_tiles;
+        self.tiles_empty += all_tiles.saturating_sub(tiles[0]);
+        let all_pieces = views * MAX_PIECES as u64;
+        self.pieces += all_pieces;
+        self.pieces_empty += all_pieces.saturating_sub(pieces.iter().sum());
+    }
 }
 
 impl Counters {
@@ -45,7 +108,7 @@ impl Counters {
         if self.rays_hit == 0 { 0.0 } else { self.splats as f64 / self.rays_hit as f64 }
     }
 
-    /// The sum of two counts of rays; `samples_drawn` is kept, it belongs to the frame.
+    /// The sum of two counts of rays; `samples_drawn` and `census` are kept, they belong to the frame.
     pub fn merge(self, other: Self) -> Self {
         Self {
             rays: self.rays + other.rays,
@@ -55,6 +118,7 @@ impl Counters {
             splats: self.splats + other.splats,
             uncovered: self.uncovered + other.uncovered,
             samples_drawn: self.samples_drawn.max(other.samples_drawn),
+            census: self.census,
         }
     }
 }

@@ -144,6 +144,11 @@ fn writes_picture_and_statistics() {
     for key in ["adapter", "height", "samples", "samples_drawn", "splats_per_pixel", "pass_ms", "counters"] {
         assert!(!stats[key].is_null(), "{key}");
     }
+    // Two rays for each of 12 x 10 pixels, which all kernels of the ball reach into; a CPU has no shards.
+    let census = &stats["counters"]["census"];
+    assert_eq!((&census["views"], &census["tiles"]), (&2.into(), &2.into()), "{census}");
+    assert_eq!(census["samples_shown"].as_u64(), stats["samples"].as_u64().map(|n| 2 * n), "{census}");
+    assert!(stats.get("shards").is_some_and(serde_json::Value::is_null));
     for time in ["min", "median", "max"] {
         assert!(stats["frame_ms"][time].is_number() && stats["pass_ms"]["splat"][time].is_number());
     }

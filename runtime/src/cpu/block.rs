@@ -1,6 +1,7 @@
 //! The ray passes over one block of pixels: segments, splats and surface of all its sub-pixel rays, tile by tile.
 
 use super::segments::{self, Scratch, Segments};
+use super::shown::Cells;
 use super::splat::{self, RayMedium};
 use super::tiles::{self, Candidates, Kernel, Rect, TILE};
 use super::{CpuRenderer, surface};
@@ -33,6 +34,8 @@ pub struct Block {
     pub pixels: Vec<(Vec3, f32)>,
     /// What was counted.
     pub counters: Counters,
+    /// Where the rays of each offset are inside; empty where nobody counts.
+    pub cells: Vec<Cells>,
     /// Seconds in segments, splat, surface.
     pub seconds: [f64; 3],
 }
@@ -64,6 +67,7 @@ impl Shared<'_> {
             rect,
             pixels: vec![(Vec3::ZERO, 0.0); pixels],
             counters: Counters { rays: (pixels * self.offsets.len()) as u64, ..Counters::default() },
+            cells: vec![Cells::of(rect); if self.renderer.counting { self.offsets.len() } else { 0 }],
             seconds: [0.0; 3],
         };
         let per_pixel = 1.0 / self.offsets.len() as f32;
@@ -72,7 +76,7 @@ impl Shared<'_> {
         let mut work = self.open(rect);
         for tile in rect.split(TILE) {
             let started = Instant::now();
-            self.trace(rect, tile, &mut work);
+            self.trace(rect, tile, &mut work, &mut block.cells);
             block.seconds[0] += started.elapsed().as_secs_f64();
             let started = Instant::now();
             self.splat(tile, &mut work, |ray, radiance, splats| {
@@ -105,7 +109,7 @@ impl Shared<'_> {
         let mut work = self.open(rect);
         let mut results = vec![RayResult::default(); rect.width() * (rect.high[1] - rect.low[1]) as usize];
         for tile in rect.split(TILE) {
-            self.trace(rect, tile, &mut work);
+            self.trace(rect, tile, &mut work, &mut []);
             self.splat(tile, &mut work, |ray, radiance, _| {
                 results[ray.pixel] = RayResult {
                     pieces: ray.segments.pieces.map(|p| (p.start, p.end)),
@@ -120,24 +124,36 @@ impl Shared<'_> {
 
     fn open(&self, rect: Rect) -> Work {
         let mut work = Work::default();
-        tiles::select(self.kernels, self.frame, rect, &mut work.block);
+        tiles::select(self.kernels, self.frame, rect, [0.0, f32::INFINITY], &mut work.block);
         work
     }
 
+    /// How far away, at the least and at the most, rays see into the object.
+    fn range(&self, rays: &[TileRay]) -> [f32; 2] {
+        let pieces = || rays.iter().flat_map(|r| r.segments.pieces());
+        let near = pieces().map(|p| p.start).fold(f32::INFINITY, f32::min);
+        // Every piece is looked into.
+        let far = pieces().map(|p| p.end.min(p.start + self.renderer.sight)).fold(0.0, f32::max);
+        [near, far]
+    }
+
     /// Fills `work.rays` with the rays of a tile that hit the mesh.
-    fn trace(&self, block: Rect, tile: Rect, work: &mut Work) {
+    fn trace(&self, block: Rect, tile: Rect, work: &mut Work, cells: &mut [Cells]) {
         let (frame, renderer) = (self.frame, self.renderer);
         work.rays.clear();
         for y in tile.low[1]..tile.high[1] {
             for x in tile.low[0]..tile.high[0] {
                 let pixel = (y - block.low[1]) as usize * block.width() + (x - block.low[0]) as usize;
-                for [dx, dy] in self.offsets {
+                for (k, [dx, dy]) in self.offsets.iter().enumerate() {
                     let direction =
                         frame.view.direction(x as f32 + dx, y as f32 + dy, frame.width, frame.height);
                     let origin = frame.view.origin;
                     let segments =
                         segments::trace(&renderer.accel, renderer.ior, origin, direction, &mut work.scratch);
                     if segments.count > 0 {
+                        if let Some(cells) = cells.get_mut(k) {
+                            cells.add([x - block.low[0], y - block.low[1]], segments.pieces());
+                        }
                         work.rays.push(TileRay { pixel, direction, segments });
                     }
                 }
@@ -151,7 +167,8 @@ impl Shared<'_> {
             return;
         }
         let renderer = self.renderer;
-        tiles::select(&work.block, self.frame, tile, &mut work.tile);
+        let range = self.range(&work.rays);
+        tiles::select(&work.block, self.frame, tile, range, &mut work.tile);
         work.candidates.fill(&work.tile, &renderer.cloud);
         let medium = RayMedium { extinction: renderer.extinction, density: renderer.density.as_ref() };
         for ray in &work.rays {

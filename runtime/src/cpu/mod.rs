@@ -3,6 +3,7 @@
 mod block;
 pub mod lighting;
 pub mod segments;
+pub mod shown;
 pub mod splat;
 pub mod surface;
 pub mod tiles;
@@ -24,6 +25,7 @@ use diaphane_formats::visibility::Accel;
 use glam::{DVec3, Vec3};
 use lighting::Lighting;
 use rayon::prelude::*;
+use shown::Cells;
 use std::time::Instant;
 use tiles::{BLOCK, Rect};
 
@@ -44,6 +46,9 @@ pub struct CpuRenderer {
     samples_drawn: u64,
     info: Info,
     reuse: bool,
+    counting: bool,
+    /// How far one sees into the medium.
+    sight: f32,
     /// Sources of the last frame, and what they depend on.
     lit: Option<(LightingKey, Vec<Source>)>,
 }
@@ -73,6 +78,8 @@ impl CpuRenderer {
             samples,
             info: asset.info.clone(),
             reuse: false,
+            counting: false,
+            sight: sight(&asset.info, asset.density.as_ref()),
             lit: None,
         })
     }
@@ -82,12 +89,18 @@ impl CpuRenderer {
         self.reuse = reuse;
     }
 
+    /// Whether [`crate::rendered::Census`] is wanted.
+    pub fn set_counting(&mut self, counting: bool) {
+        self.counting = counting;
+    }
+
     /// Takes extinction and albedo from an edited asset's parameters; the rest of them must be the asset's own.
     pub fn set_material(&mut self, info: &Info) {
         self.lighting.set_material(info);
         self.stencil.set_extinction(&self.samples, largest_extinction(info, self.density.as_ref()));
         self.extinction = extinction_along(info, self.density.is_some());
         self.means = means_share(info.ratio());
+        self.sight = sight(info, self.density.as_ref());
         self.info = info.clone();
         self.lit = None;
     }
@@ -121,13 +134,20 @@ impl CpuRenderer {
         let mut coverage = vec![0.0; picture.pixels.len()];
         let mut counters = Counters { samples_drawn: self.samples_drawn, ..Counters::default() };
         let mut seconds = [0.0; 3];
+        let mut cells = vec![Cells::new(frame); if self.counting { offsets.len() } else { 0 }];
         for block in blocks {
             scatter(block.rect, picture.width, &block.pixels, |to, (radiance, covered)| {
                 picture.pixels[to] = radiance.to_array();
                 coverage[to] = covered;
             });
             counters = counters.merge(block.counters);
+            cells.iter_mut().zip(&block.cells).for_each(|(all, part)| all.put(block.rect, part));
             (0..3).for_each(|k| seconds[k] += block.seconds[k]);
+        }
+        for (cells, offset) in cells.iter().zip(&offsets) {
+            let samples = shown::count(&self.cloud, frame, *offset, cells, self.sight);
+            let (tiles, pieces) = cells.tiles();
+            counters.census.add(1, [frame.width, frame.height], samples, tiles, pieces);
         }
         picture.coverage = Some(coverage);
         let rays = (picture.pixels.len() * offsets.len()) as u64;
@@ -164,6 +184,12 @@ impl CpuRenderer {
         let triangle = triangle as usize;
         surface::Entry::new(frame.view.origin + direction * t, self.corners[triangle], self.normals[triangle])
     }
+}
+
+/// How far one sees into a medium at the most, wherever one enters.
+fn sight(info: &Info, grid: Option<&DensityGrid>) -> f32 {
+    let least = |g: &DensityGrid| g.values.iter().map(|v| v[0].to_f32()).fold(f32::INFINITY, f32::min);
+    shown::sight(extinction_along(info, grid.is_some()).min_element() * grid.map_or(1.0, least))
 }
 
 /// κ along camera rays, per channel: at density 1 where there is a grid.

@@ -105,11 +105,15 @@ pub fn kernels(cloud: &Cloud, camera: Vec3) -> Vec<Kernel> {
     (0..cloud.centre.len()).filter(|&i| cloud.weight[i] > 0.0).map(kernel).collect()
 }
 
-/// Those of `kernels` that rays of `rect` may meet, into `out` (cleared).
-pub fn select(kernels: &[Kernel], frame: &Frame, rect: Rect, out: &mut Vec<Kernel>) {
+/// Those of `kernels` that rays of `rect` may meet between two distances, into `out` (cleared).
+pub fn select(kernels: &[Kernel], frame: &Frame, rect: Rect, [near, far]: [f32; 2], out: &mut Vec<Kernel>) {
     let cone = Cone::new(&frame.view, frame, rect);
     out.clear();
-    out.extend(kernels.iter().filter(|k| cone.may_meet(k.centre, k.radius)));
+    let in_range = |k: &Kernel| {
+        let distance = k.centre.length();
+        distance - k.radius <= far && distance + k.radius >= near
+    };
+    out.extend(kernels.iter().filter(|k| in_range(k) && cone.may_meet(k.centre, k.radius)));
 }
 
 #[derive(Clone, Copy)]

@@ -5,26 +5,26 @@ use super::corners::Corners;
 use super::faults::allocate;
 use super::neighbours::neighbours;
 use super::packed;
-use super::pipeline::SplatPath;
+use super::shard::{Shard, Source, ranges};
+use super::splatting::SplatPath;
 use super::targets::PixelState;
 use super::uniforms::MediumUniform;
 use crate::cpu::surface::corner_normals;
-use crate::rendered::MAX_PIECES;
 use crate::usable::{density_at, usable_samples};
 use crate::{Error, Result};
 use diaphane_formats::asset::{Asset, Info, Samples};
 use diaphane_formats::hits::DENSE;
-use diaphane_formats::slopes::{NEIGHBOURS, Stencil};
+use diaphane_formats::slopes::Stencil;
 use diaphane_formats::{kernel, sh};
-use glam::Vec3;
 use std::sync::Arc;
-use wgpu::{BindingResource, Buffer, BufferBinding, BufferSize, BufferUsages, Device, Queue};
+use wgpu::{Buffer, BufferUsages, Device, Queue};
 
 /// Everything that stays as long as the asset does.
 #[derive(Clone)]
 pub(super) struct AssetBuffers {
-    pub medium: Buffer,
-    /// What [`Self::medium`] holds.
+    /// The samples, in as many shards as the adapter's bindings ask for; at least one.
+    pub shards: Vec<Shard>,
+    /// What all shards' media hold, but for which samples they are.
     pub material: MediumUniform,
     pub positions: Buffer,
     pub triangles: Buffer,
@@ -33,35 +33,20 @@ pub(super) struct AssetBuffers {
     pub indices: Buffer,
     pub neighbours: Buffer,
     pub normals: Buffer,
-    /// Kernels, then a sphere around every [`CLUSTER`] of them that follow each other; radius 0 without any.
-    pub samples: Buffer,
-    pub weights: Buffer,
-    pub depth: Buffer,
-    pub boundary: Buffer,
     pub recurrence: Buffer,
     /// Layout and profiles of the harmonics' bands.
     pub bands: Buffer,
-    /// Where each sample's codes are, and its scales.
-    pub packed: Buffer,
     pub grid: Buffer,
-    /// Where values hold, and the density there.
-    pub centroids: Buffer,
-    /// Gradient stencils.
-    pub spokes: Buffer,
-    /// Written by the lighting pass.
+    /// Of all samples, whatever their shard, because slopes look at neighbours; written by the lighting pass.
     pub values: Buffer,
-    /// Written by the slopes pass.
-    pub sources: Buffer,
-    /// Written by the outlines pass, and by the next instance's.
-    pub outlines: Buffer,
-    /// Whether a sample may meet each piece.
-    pub shown: Buffer,
     /// As they are played.
     pub info: Info,
     /// Kept for the transmittance of folded lights.
     pub source: Arc<Samples>,
-    /// Of the grid; 1 without.
-    most_density: f32,
+    /// Of the grid, least and greatest; 1 without.
+    densities: [f32; 2],
+    /// Whether pixels keep sums from shard to shard in a buffer.
+    kept: bool,
     /// Of the widest kernel.
     least_sharpness: f32,
     pub sample_count: u32,
@@ -110,31 +95,27 @@ impl AssetBuffers {
         let recurrence: Vec<[f32; 4]> = sh::shader_table().iter().map(|&[a, b]| [a, b, 0.0, 0.0]).collect();
         let grid = asset.density.as_ref().map_or(&[][..], |g| &g.values);
         let material = MediumUniform::new(asset);
-        let limits = device.limits();
-        let most = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
-        let largest = [
-            samples.depth.codes.len() + 8,
-            samples.boundary.codes.len() + 8,
-            16 * NEIGHBOURS * kernels.len(),
-            36 * asset.mesh_triangles.len(),
-            12 * asset.mesh_positions.len(),
-            4 * grid.len(),
-        ];
-        if let Some(size) = largest.into_iter().map(|s| s as u64).max().filter(|&s| s > most) {
-            return Err(Error::Gpu(format!(
-                "the asset needs a buffer of {} MiB, the adapter allows {} MiB",
-                size >> 20,
-                most >> 20
-            )));
-        }
+        let densities = densities(grid.iter().map(|v| v[0].to_f32()));
+        let fits = Fits::new(device);
+        fits.bound("values of the samples", 16 * kernels.len())?;
+        fits.bound("triangles", 12 * asset.mesh_triangles.len())?;
+        fits.bound("normals", size_of_val(normals.as_slice()))?;
+        fits.bound("vertices", 12 * asset.mesh_positions.len())?;
+        fits.bound("density grid", 4 * grid.len())?;
         if asset.mesh_triangles.len() > (u32::MAX / 3) as usize {
-            return Err(Error::Gpu("the mesh has too many triangles".to_owned()));
+            return Err(Error::Gpu("the mesh has too many triangles; use the CPU backend".to_owned()));
         }
+        let source =
+            Source { samples: &samples, kernels: &kernels, centroids: &centroids, spokes: &spokes, material };
+        let shards: Vec<Shard> = ranges(kernels.len(), fits.binding)
+            .ok_or_else(|| fits.refuse("samples", 64 * size_of_val(&spokes[..1])))?
+            .into_iter()
+            .map(|range| Shard::new(device, &source, range, path))
+            .collect();
         let corners = Corners::new(&asset.mesh_triangles, asset.mesh_positions.len());
         let drawn: Vec<[f32; 3]> =
             corners.vertices.iter().map(|v| asset.mesh_positions[*v as usize]).collect();
-        // Only quads need them.
-        let outlined = if path == SplatPath::Quads { kernels.len() as u64 } else { 0 };
+        fits.held("triangles' corners", 12 * drawn.len().max(asset.mesh_triangles.len()))?;
         let storage = BufferUsages::STORAGE;
         Ok(Self {
             positions: filled_buffer(device, "positions", &asset.mesh_positions, storage),
@@ -143,36 +124,18 @@ impl AssetBuffers {
             indices: filled_buffer(device, "indices", &corners.indices, BufferUsages::INDEX),
             neighbours: filled_buffer(device, "neighbours", &neighbours(&asset.mesh_triangles), storage),
             normals: filled_buffer(device, "normals", normals.as_flattened(), storage),
-            samples: filled_buffer(
-                device,
-                "samples",
-                &[&kernels[..], &clusters(&kernels, &samples.weight)].concat(),
-                storage,
-            ),
-            weights: filled_buffer(device, "weights", &samples.weight, storage),
-            depth: filled_buffer(device, "depth", &packed::words(&samples.depth), storage),
-            boundary: filled_buffer(device, "boundary", &packed::words(&samples.boundary), storage),
             recurrence: filled_buffer(device, "recurrence", &recurrence, BufferUsages::UNIFORM),
             bands: filled_buffer(device, "bands", &packed::bands(&samples), BufferUsages::UNIFORM),
-            packed: filled_buffer(device, "packed", &packed::records(&samples), storage),
             grid: filled_buffer(device, "grid", grid, storage),
-            centroids: filled_buffer(device, "centroids", &centroids, storage),
-            spokes: filled_buffer(device, "spokes", &spokes, storage),
             values: empty_buffer(
                 device,
                 "values",
                 16 * kernels.len() as u64,
                 storage | BufferUsages::COPY_DST,
             ),
-            sources: empty_buffer(device, "sources", 64 * kernels.len() as u64, storage),
-            outlines: empty_buffer(device, "outlines", OUTLINE * outlined, storage),
-            shown: empty_buffer(device, "shown", MAX_PIECES as u64 * shown_stride(outlined), storage),
             info: info.clone(),
-            most_density: if grid.is_empty() {
-                1.0
-            } else {
-                grid.iter().map(|v| v[0].to_f32()).fold(0.0, f32::max)
-            },
+            densities,
+            kept: shards.len() > 1 && path == SplatPath::Tiles,
             least_sharpness: kernels.iter().map(|k| k[3]).fold(f32::INFINITY, f32::min),
             sample_count: kernels.len() as u32,
             samples_drawn: samples.weight.iter().filter(|w| **w > 0.0).count() as u64,
@@ -181,12 +144,7 @@ impl AssetBuffers {
             fresnel,
             boundary_order: info.boundary_order as usize,
             heterogeneous: asset.density.is_some(),
-            medium: filled_buffer(
-                device,
-                "medium",
-                &[material],
-                BufferUsages::UNIFORM | BufferUsages::COPY_DST,
-            ),
+            shards,
             material,
             source: Arc::new(samples),
         })
@@ -194,33 +152,30 @@ impl AssetBuffers {
 
     /// Takes extinction and albedo from an edited asset's parameters: a few bytes to upload.
     pub fn set_material(&mut self, queue: &Queue, info: &Info) {
-        self.material.set_material(info, self.heterogeneous);
+        self.material.set_material(info, self.heterogeneous.then_some(self.densities[0]));
         self.info = info.clone();
-        queue.write_buffer(&self.medium, 0, bytemuck::bytes_of(&self.material));
+        for shard in &self.shards {
+            queue.write_buffer(&shard.medium, 0, bytemuck::bytes_of(&shard.uniform(self.material)));
+        }
     }
 
     /// The same object once more, with values and sources of its own.
     pub fn instance(&self, device: &Device) -> Self {
-        let own = |label: &str, like: &Buffer| empty_buffer(device, label, like.size(), like.usage());
-        Self { values: own("values", &self.values), sources: own("sources", &self.sources), ..self.clone() }
+        let values = empty_buffer(device, "values", self.values.size(), self.values.usage());
+        let shards = self.shards.iter().map(|s| s.instance(device)).collect();
+        Self { values, shards, ..self.clone() }
     }
 
     /// Gives this instance a medium of its own.
     pub fn own_medium(&mut self, device: &Device) {
-        let usage = BufferUsages::UNIFORM | BufferUsages::COPY_DST;
-        self.medium = filled_buffer(device, "medium", &[self.material], usage);
-    }
-
-    /// Which samples may meet piece `k`.
-    pub fn shown(&self, k: usize) -> BindingResource<'_> {
-        let part = self.shown.size() / MAX_PIECES as u64;
-        let (offset, size) = (k as u64 * part, BufferSize::new(part));
-        BindingResource::Buffer(BufferBinding { buffer: &self.shown, offset, size })
+        for shard in &mut self.shards {
+            shard.own_medium(device, self.material);
+        }
     }
 
     /// What it keeps for a pixel.
     pub fn pixel_state(&self) -> PixelState {
-        PixelState { fresnel: self.fresnel, heterogeneous: self.heterogeneous }
+        PixelState { fresnel: self.fresnel, heterogeneous: self.heterogeneous, kept: self.kept }
     }
 
     /// Whether another asset's passes are compiled with the same constants, its [`Variant`] aside.
@@ -234,16 +189,9 @@ impl AssetBuffers {
     pub fn variant(&self) -> Variant {
         Variant {
             grey: self.material.is_grey(),
-            dense: self.material.kappa.max_element() * self.most_density > DENSE * self.least_sharpness,
+            dense: self.material.kappa.max_element() * self.densities[1] > DENSE * self.least_sharpness,
             heterogeneous: self.heterogeneous,
         }
-    }
-
-    /// Columns and rows of workgroups with 64 threads that give each sample one.
-    pub fn sample_groups(&self) -> [u32; 2] {
-        const ROW: u32 = 1024;
-        let groups = self.sample_count.div_ceil(64);
-        [groups.min(ROW), groups.div_ceil(ROW)]
     }
 }
 
@@ -269,27 +217,49 @@ impl Variant {
     }
 }
 
-/// Bytes of a sample's outline.
-const OUTLINE: u64 = 24;
-
-/// Bytes that tell of each of so many samples whether it is shown, such that a binding may begin behind them.
-fn shown_stride(samples: u64) -> u64 {
-    (4 * samples).next_multiple_of(256).max(256)
+/// Least and greatest; 1 without any.
+fn densities(values: impl Iterator<Item = f32>) -> [f32; 2] {
+    values.map(|v| [v; 2]).reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])]).unwrap_or([1.0; 2])
 }
 
-/// Samples of a cluster.
-const CLUSTER: usize = 64;
+/// What the device's limits let buffers hold.
+struct Fits {
+    /// Bytes of a binding.
+    binding: u64,
+    /// Bytes of a buffer.
+    buffer: u64,
+}
 
-/// Spheres around the supports of [`CLUSTER`] kernels each (position, sharpness), as far as they have weight.
-fn clusters(kernels: &[[f32; 4]], weights: &[f32]) -> Vec<[f32; 4]> {
-    let sphere = |(kernels, weights): (&[[f32; 4]], &[f32])| {
-        let drawn = || kernels.iter().zip(weights).filter(|(_, w)| **w > 0.0).map(|(k, _)| *k);
-        let centre = |k: [f32; 4]| Vec3::new(k[0], k[1], k[2]);
-        let low = drawn().map(centre).fold(Vec3::INFINITY, Vec3::min);
-        let high = drawn().map(centre).fold(Vec3::NEG_INFINITY, Vec3::max);
-        let middle = if low.is_finite() { 0.5 * (low + high) } else { Vec3::ZERO };
-        let reach = |k: [f32; 4]| middle.distance(centre(k)) + kernel::CUT_OFF_RADIUS / k[3];
-        middle.extend(drawn().map(reach).fold(0.0, f32::max)).to_array()
-    };
-    kernels.chunks(CLUSTER).zip(weights.chunks(CLUSTER)).map(sphere).collect()
+impl Fits {
+    fn new(device: &Device) -> Self {
+        let limits = device.limits();
+        let buffer = limits.max_buffer_size;
+        Self { binding: limits.max_storage_buffer_binding_size.min(buffer), buffer }
+    }
+
+    /// Whether a shader may see so many bytes at once.
+    fn bound(&self, what: &str, bytes: usize) -> Result<()> {
+        if bytes as u64 > self.binding { Err(self.refuse(what, bytes)) } else { Ok(()) }
+    }
+
+    /// Whether a buffer that no shader binds may hold them.
+    fn held(&self, what: &str, bytes: usize) -> Result<()> {
+        if bytes as u64 > self.buffer {
+            return Err(too_large(what, bytes, "max_buffer_size", self.buffer));
+        }
+        Ok(())
+    }
+
+    fn refuse(&self, what: &str, bytes: usize) -> Error {
+        too_large(what, bytes, "max_storage_buffer_binding_size", self.binding)
+    }
+}
+
+fn too_large(what: &str, bytes: usize, limit: &str, most: u64) -> Error {
+    let mib = |bytes: u64| bytes as f64 / f64::from(1 << 20);
+    Error::Gpu(format!(
+        "the asset's {what} take {:.1} MiB, the adapter's {limit} is {:.1} MiB; use the CPU backend",
+        mib(bytes as u64),
+        mib(most)
+    ))
 }

@@ -47,20 +47,31 @@ impl GpuDevice {
         let mut refused = Vec::new();
         for adapter in adapters {
             match lacking(&adapter, surface) {
-                None => return Self::request(adapter),
+                None => return Self::request(adapter, u64::MAX),
                 Some(reason) => refused.push(format!("{} {reason}", adapter.get_info().name)),
             }
         }
         Err(Error::NoAdapter(refused.join(", ")))
     }
 
-    fn request(adapter: Adapter) -> Result<Self> {
+    /// The same adapter's device once more, whose buffers shaders may see at most `binding` bytes of at once: as little as another
+    /// adapter may have.
+    ///
+    /// # Errors
+    /// [`Error::NoAdapter`].
+    pub fn with_binding(self, binding: u64) -> Result<Self> {
+        Self::request(self.adapter, binding)
+    }
+
+    fn request(adapter: Adapter, binding: u64) -> Result<Self> {
         let required_features = adapter.features() & WANTED;
         let name = adapter.get_info().name;
+        let mut limits = adapter.limits();
+        limits.max_storage_buffer_binding_size = limits.max_storage_buffer_binding_size.min(binding);
         let (device, queue) = pollster::block_on(adapter.request_device(&DeviceDescriptor {
             label: Some("diaphane"),
             required_features,
-            required_limits: adapter.limits(),
+            required_limits: limits,
             ..Default::default()
         }))
         .map_err(|e| Error::NoAdapter(format!("{name} gives no device ({e})")))?;

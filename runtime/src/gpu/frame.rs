@@ -25,7 +25,8 @@ pub(super) struct FrameBuffers {
     known: Option<(Vec3, Linear)>,
     /// What folded lights send.
     pub ambient: Buffer,
-    common: BindGroup,
+    /// One for each shard.
+    common: Vec<BindGroup>,
     changed: bool,
     /// Which lights are evaluated how.
     pub plan: Plan,
@@ -45,13 +46,20 @@ pub(super) fn common_layout(device: &Device) -> BindGroupLayout {
     )
 }
 
-fn common_group(device: &Device, layout: &BindGroupLayout, views: &Buffer, medium: &Buffer) -> BindGroup {
+fn common_groups(
+    device: &Device,
+    layout: &BindGroupLayout,
+    views: &Buffer,
+    asset: &AssetBuffers,
+) -> Vec<BindGroup> {
     let view = wgpu::BindingResource::Buffer(BufferBinding {
         buffer: views,
         offset: 0,
         size: wgpu::BufferSize::new(size_of::<ViewUniform>() as u64),
     });
-    group(device, "common", layout, vec![view, medium.as_entire_binding()])
+    let of =
+        |medium: &Buffer| group(device, "common", layout, vec![view.clone(), medium.as_entire_binding()]);
+    asset.shards.iter().map(|shard| of(&shard.medium)).collect()
 }
 
 impl FrameBuffers {
@@ -60,7 +68,7 @@ impl FrameBuffers {
         let views =
             empty_buffer(device, "views", VIEW_STRIDE, BufferUsages::UNIFORM | BufferUsages::COPY_DST);
         Self {
-            common: common_group(device, common, &views, &asset.medium),
+            common: common_groups(device, common, &views, asset),
             views,
             lights: empty_buffer(device, "lights", 64, BufferUsages::STORAGE | BufferUsages::COPY_DST),
             exact: empty_buffer(device, "exact", 16, BufferUsages::STORAGE | BufferUsages::COPY_DST),
@@ -76,11 +84,11 @@ impl FrameBuffers {
 
     /// Binds another medium.
     pub fn renew(&mut self, device: &Device, common: &BindGroupLayout, asset: &AssetBuffers) {
-        self.common = common_group(device, common, &self.views, &asset.medium);
+        self.common = common_groups(device, common, &self.views, asset);
     }
 
-    /// The shared group; set it with an offset of [`VIEW_STRIDE`] times the view's index.
-    pub fn common(&self) -> &BindGroup {
+    /// The shared group of each shard; set it with an offset of [`VIEW_STRIDE`] times the view's index.
+    pub fn common(&self) -> &[BindGroup] {
         &self.common
     }
 
@@ -105,7 +113,7 @@ impl FrameBuffers {
         if self.views.size() < bytes.len() as u64 {
             let usage = BufferUsages::UNIFORM | BufferUsages::COPY_DST;
             self.views = empty_buffer(device, "views", bytes.len() as u64, usage);
-            self.common = common_group(device, layout, &self.views, &asset.medium);
+            self.common = common_groups(device, layout, &self.views, asset);
         }
         queue.write_buffer(&self.views, 0, &bytes);
     }

@@ -1,10 +1,12 @@
 //! A renderer that owns its device and reads its pictures back.
 
+use super::census;
 use super::device::{GpuDevice, instance};
 use super::faults::wait;
-use super::pipeline::{Pipeline, SplatPath};
+use super::pipeline::Pipeline;
 use super::readback;
-use super::targets::Targets;
+use super::splatting::SplatPath;
+use super::targets::{CENSUS, Targets};
 use super::tiles::Tile;
 use super::timers::{PASSES, Pass, Timers};
 use crate::exact::ExactDepths;
@@ -81,6 +83,11 @@ impl GpuRenderer {
         self.tiles
     }
 
+    /// Parts that the samples are cut into; more than one where they are too many for the adapter's bindings.
+    pub fn shards(&self) -> usize {
+        self.renderer.asset.shards.len()
+    }
+
     /// Takes extinction and albedo from an edited asset's parameters; the rest of them must be the asset's own.
     pub fn set_material(&mut self, info: &Info) {
         self.renderer.set_material(&self.owned.device, &self.owned.queue, info);
@@ -129,6 +136,7 @@ impl GpuRenderer {
                 counters.splats += u64::from(counts[2]);
                 counters.uncovered += u64::from(counts[3]);
             }
+            census::add(&mut counters.census, data.census, offsets.len() as u64, tile.size);
         })?;
         picture.coverage = Some(coverage);
         counters.rays_skipped = counters.rays - traced;
@@ -258,6 +266,7 @@ impl GpuRenderer {
             (&targets.radiance, size),
             (&targets.counters, size),
             (&targets.pieces, targets.pieces.size()),
+            (&targets.census, CENSUS),
         ];
         sources.extend(self.timers.buffer());
         let copies = readback::buffers(&self.owned.device, &self.owned.queue, &sources)?;
@@ -267,9 +276,9 @@ impl GpuRenderer {
                 .get_mapped_range(..)
                 .map_err(|e| Error::Gpu(format!("cannot read the picture back: {e}")))
         };
-        let (radiance, counters, pieces) = (view(0)?, view(1)?, view(2)?);
+        let (radiance, counters, pieces, census) = (view(0)?, view(1)?, view(2)?, view(3)?);
         if let Some(reading) = self.timers.reading() {
-            reading.sum(&view(3)?, milliseconds);
+            reading.sum(&view(4)?, milliseconds);
         }
         take(
             tile,
@@ -277,6 +286,7 @@ impl GpuRenderer {
                 radiance: bytemuck::cast_slice(&radiance),
                 counters: bytemuck::cast_slice(&counters),
                 pieces: bytemuck::cast_slice(&pieces),
+                census: bytemuck::cast_slice(&census),
                 stride: Targets::stride(targets),
             },
         );
@@ -292,6 +302,8 @@ struct TileData<'a> {
     counters: &'a [[u32; 4]],
     /// Of the last ray: piece k of pixel i at `k * stride + i`: start, end, transmittances.
     pieces: &'a [[f32; 4]],
+    /// Of all rays.
+    census: &'a [u32],
     stride: usize,
 }
 

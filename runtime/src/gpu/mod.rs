@@ -3,18 +3,21 @@
 //! ```text
 //! lighting                     once a frame: samples × lights -> source of every sample
 //! surface [boundary] segments  each sub-pixel ray: mesh -> sorted crossings -> up to four inside pieces
+//! outlines batches             each sub-pixel ray: which samples a piece may show, listed by 64 and counted
 //! [profile] gather             each piece: kernels along it, summed and normalised, tile by tile -> picture
-//!           or splat resolve   the same by blended quads ([`SplatPath`]), whose outlines are found once a ray
+//!           or splat resolve   the same by blended quads ([`SplatPath`])
 //! ```
 //!
 //! [`GpuRenderer`] owns its device and reads pictures back; [`PictureRenderer`] records the same passes into a command buffer,
 //! with two more for a window: publish (mean of the rays so far) and display (exposure). [`Renderer`] draws many objects into
 //! a host program's frame, with passes that clip at its depth buffer, compose objects front to back and overlay its picture. Boundary runs where `ior` is not 1, profile where the medium has a density grid. Later pieces of rays are
-//! drawn indirectly and cost next to nothing where no ray has them. [`rivals`] draws the same light in other ways. Sums are kept in 32-bit floats and added in the
+//! drawn indirectly and cost next to nothing where no ray has them.
+//! Passes over samples run once for each shard (`shard.rs`). [`rivals`] draws the same light in other ways. Sums are kept in 32-bit floats and added in the
 //! order of the samples: the same adapter draws the same bits every time.
 
 mod asset;
 mod bindings;
+mod census;
 mod corners;
 mod device;
 mod faults;
@@ -29,6 +32,8 @@ mod pipeline;
 mod readback;
 pub mod rivals;
 mod shaders;
+mod shard;
+mod splatting;
 mod targets;
 mod tiles;
 mod timers;
@@ -39,5 +44,5 @@ pub use faults::{guarded, is_guarded, wait};
 pub use headless::GpuRenderer;
 pub use host::{AssetId, HostDepth, HostFrame, HostReport, InstanceId, Options, Renderer};
 pub use picture::{PictureRenderer, Request, Statistics};
-pub use pipeline::SplatPath;
 pub use readback::texture as read_texture;
+pub use splatting::SplatPath;

@@ -1,5 +1,6 @@
 //! The passes: pipelines, and the commands of each.
 
+pub(super) mod batches;
 pub(super) mod boundary;
 pub(super) mod clip;
 pub(super) mod compose;
@@ -20,13 +21,15 @@ pub(super) mod surface;
 
 use wgpu::{BindGroup, Buffer, CommandEncoder, ComputePassDescriptor, ComputePipeline};
 
+use super::shard::Shard;
 use super::timers::{Pass, Timers};
 
 /// What a pass is recorded with: the command buffer, the shared group and the ray's place in it.
 pub(super) struct Recorder<'a> {
     pub encoder: &'a mut CommandEncoder,
     pub timers: &'a mut Timers,
-    pub common: &'a BindGroup,
+    /// One for each of the object's shards, of which passes that mind no samples take the first.
+    pub common: &'a [BindGroup],
     pub view_offset: u32,
     /// Columns and rows of the tile; the targets may be larger.
     pub tile: [u32; 2],
@@ -45,9 +48,9 @@ impl Recorder<'_> {
     }
 
     /// Points a render pass at the tile and the shared group.
-    fn aim(common: &BindGroup, view_offset: u32, tile: [u32; 2], render: &mut wgpu::RenderPass<'_>) {
+    fn aim(common: &[BindGroup], view_offset: u32, tile: [u32; 2], render: &mut wgpu::RenderPass<'_>) {
         render.set_viewport(0.0, 0.0, tile[0] as f32, tile[1] as f32, 0.0, 1.0);
-        render.set_bind_group(0, common, &[view_offset]);
+        render.set_bind_group(0, &common[0], &[view_offset]);
     }
 
     /// Runs a compute pass over the tile's pixels that no timer watches.
@@ -57,7 +60,7 @@ impl Recorder<'_> {
             .encoder
             .begin_compute_pass(&ComputePassDescriptor { label: Some(label), timestamp_writes: None });
         compute.set_pipeline(pipeline);
-        compute.set_bind_group(0, self.common, &[self.view_offset]);
+        compute.set_bind_group(0, &self.common[0], &[self.view_offset]);
         compute.set_bind_group(1, group, &[]);
         compute.dispatch_workgroups(x, y, 1);
     }
@@ -68,15 +71,45 @@ impl Recorder<'_> {
         pass: Pass,
         pipeline: &ComputePipeline,
         group: &BindGroup,
-        dispatch: impl FnOnce(&mut wgpu::ComputePass<'_>),
+        dispatch: impl Fn(&mut wgpu::ComputePass<'_>),
+    ) {
+        self.over_shards(pass, pipeline, std::slice::from_ref(group), |pass, _| dispatch(pass));
+    }
+
+    /// The same for each shard, which has a group of its own; `dispatch` gets its index.
+    fn over_shards(
+        &mut self,
+        pass: Pass,
+        pipeline: &ComputePipeline,
+        groups: &[BindGroup],
+        dispatch: impl Fn(&mut wgpu::ComputePass<'_>, usize),
     ) {
         let mut compute = self.encoder.begin_compute_pass(&ComputePassDescriptor {
             label: Some(pass.name()),
             timestamp_writes: self.timers.compute(pass),
         });
         compute.set_pipeline(pipeline);
-        compute.set_bind_group(0, self.common, &[self.view_offset]);
-        compute.set_bind_group(1, group, &[]);
-        dispatch(&mut compute);
+        for (k, (common, group)) in self.common.iter().zip(groups).enumerate() {
+            compute.set_bind_group(0, common, &[self.view_offset]);
+            compute.set_bind_group(1, group, &[]);
+            dispatch(&mut compute, k);
+        }
+    }
+
+    /// The same with a thread for every sample, `rounds` times each.
+    fn over_samples(
+        &mut self,
+        pass: Pass,
+        pipeline: &ComputePipeline,
+        groups: &[BindGroup],
+        shards: &[Shard],
+        rounds: u32,
+    ) {
+        self.over_shards(pass, pipeline, groups, |pass, k| {
+            let [columns, rows] = shards[k].sample_groups();
+            for _ in 0..rounds {
+                pass.dispatch_workgroups(columns, rows, 1);
+            }
+        });
     }
 }

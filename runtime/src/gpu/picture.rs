@@ -1,13 +1,15 @@
 //! The renderer for programs that own device and window: it records into their command buffer and draws into their
 //! render pass.
 
+use super::census;
 use super::faults::allocate;
 use super::passes::Recorder;
 use super::passes::display::Display;
 use super::passes::publish::Publish;
-use super::pipeline::{Pipeline, SplatPath};
+use super::pipeline::Pipeline;
 use super::readback;
-use super::targets::SUM_FORMAT;
+use super::splatting::SplatPath;
+use super::targets::{CENSUS, SUM_FORMAT};
 use super::timers::{PASSES, Pass, Reading, Timers};
 use crate::exact::ExactDepths;
 use crate::frame::Frame;
@@ -70,10 +72,13 @@ struct Shown {
 /// Numbers on their way back.
 struct Pending {
     counters: Buffer,
+    census: Buffer,
     timers: Option<(Buffer, Reading)>,
     /// Copies that arrived; `FAILED` when one did not.
     arrived: Option<Arc<AtomicU32>>,
     rays: u64,
+    /// Columns and rows.
+    size: [u32; 2],
 }
 
 const FAILED: u32 = 1 << 16;
@@ -214,7 +219,9 @@ impl PictureRenderer {
         let Some(pending) = &mut self.pending else {
             return &self.statistics;
         };
-        let copies = || std::iter::once(&pending.counters).chain(pending.timers.as_ref().map(|(b, _)| b));
+        let copies = || {
+            [&pending.counters, &pending.census].into_iter().chain(pending.timers.as_ref().map(|(b, _)| b))
+        };
         match &pending.arrived {
             None => {
                 let arrived = Arc::new(AtomicU32::new(0));
@@ -253,6 +260,11 @@ impl PictureRenderer {
                 counters.splats += u64::from(splats);
                 counters.uncovered += u64::from(uncovered);
             }
+            if let Ok(view) = pending.census.get_mapped_range(..) {
+                let words: Vec<u32> = view.chunks_exact(4).map(bytemuck::pod_read_unaligned).collect();
+                let views = pending.rays / pending.size.map(u64::from).iter().product::<u64>().max(1);
+                census::add(&mut counters.census, &words, views, pending.size);
+            }
             self.statistics.counters = counters;
         }
         if let Some((buffer, reading)) = &pending.timers
@@ -278,6 +290,8 @@ impl PictureRenderer {
         let times = times.map(|(buffer, size)| readback::copy(device, encoder, buffer, size));
         self.pending = Some(Pending {
             counters: readback::copy(device, encoder, &targets.counters, size),
+            census: readback::copy(device, encoder, &targets.census, CENSUS),
+            size: targets.size,
             timers: times.zip(self.timers.reading()),
             arrived: None,
             rays,

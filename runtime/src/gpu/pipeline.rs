@@ -3,18 +3,19 @@
 use super::asset::AssetBuffers;
 use super::frame::{FrameBuffers, VIEW_STRIDE, common_layout};
 use super::passes::Recorder;
+use super::passes::batches::Batches;
 use super::passes::boundary::Boundary;
 use super::passes::clip::Clip;
 use super::passes::fold::Fold;
-use super::passes::gather::Gather;
 use super::passes::lighting::Lighting;
 use super::passes::outlines::Outlines;
 use super::passes::profile::Profile;
-use super::passes::resolve::Resolve;
 use super::passes::segments::Segments;
 use super::passes::slopes::Slopes;
-use super::passes::splat::Splat;
 use super::passes::surface::Surface;
+use super::shard::Shard;
+pub(super) use super::splatting::SplatPath;
+use super::splatting::Splatting;
 use super::targets::{COUNTERS, LEAST, RADIANCE, TOTAL, Targets, budget};
 use super::tiles::{Tile, split};
 use super::timers::Timers;
@@ -25,7 +26,7 @@ use crate::frame::Frame;
 use crate::rendered::MAX_PIECES;
 use crate::{Error, Result};
 use diaphane_formats::asset::{Asset, Info};
-use wgpu::{BindGroup, BindGroupLayout, CommandEncoder, Device, DeviceType, Features, Queue};
+use wgpu::{BindGroup, BindGroupLayout, CommandEncoder, Device, Queue};
 
 /// The passes, their buffers and their order.
 pub(super) struct Pipeline {
@@ -37,6 +38,8 @@ pub(super) struct Pipeline {
     boundary: Option<Boundary>,
     segments: Segments,
     profile: Option<Profile>,
+    outlines: Outlines,
+    batches: Batches,
     splatting: Splatting,
     pub(super) asset: AssetBuffers,
     frame: FrameBuffers,
@@ -55,72 +58,23 @@ pub(super) struct Pipeline {
     tile_memory: u64,
 }
 
-/// How kernels are summed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum SplatPath {
-    /// A quad for each kernel, blended into textures of f32: needs `FLOAT32_BLENDABLE`.
-    Quads,
-    /// Every tile of 8 × 8 pixels gathers its kernels in registers.
-    Tiles,
-}
-
-impl SplatPath {
-    /// The one that a device draws with unless it is told otherwise: tiles need no feature beyond those of every adapter and
-    /// were faster wherever both were measured. Software adapters take quads where they can: Mesa 22.3.6's keeps the memory
-    /// of every dispatch whose workgroups have barriers, 4 MB a ray by tiles and 0.02 MB by quads.
-    pub fn best(device: &Device) -> Self {
-        let software = device.adapter_info().device_type == DeviceType::Cpu;
-        let quads = software && device.features().contains(Features::FLOAT32_BLENDABLE);
-        if quads { Self::Quads } else { Self::Tiles }
-    }
-
-    /// Itself where the device can take it.
-    ///
-    /// # Errors
-    /// Quads where 32-bit floats cannot be blended.
-    pub fn checked(self, device: &Device) -> Result<Self> {
-        if self == Self::Quads && !device.features().contains(Features::FLOAT32_BLENDABLE) {
-            return Err(Error::Gpu("the adapter cannot blend 32-bit floats, which quads need".to_owned()));
-        }
-        Ok(self)
-    }
-
-    /// "quads" or "tiles".
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Quads => "quads",
-            Self::Tiles => "tiles",
-        }
-    }
-}
-
-/// The passes of a [`SplatPath`].
-#[derive(Clone)]
-enum Splatting {
-    Quads(Outlines, Splat, Resolve),
-    Tiles(Gather),
-}
-
-/// The groups of all passes.
+/// The groups of all passes; those that mind samples have one for each shard.
 struct Groups {
-    lighting: BindGroup,
-    fold: BindGroup,
-    slopes: BindGroup,
+    lighting: Vec<BindGroup>,
+    fold: Vec<BindGroup>,
+    slopes: Vec<BindGroup>,
     surface: BindGroup,
     boundary: Option<BindGroup>,
     segments: BindGroup,
-    outlines: Option<BindGroup>,
+    outlines: Vec<BindGroup>,
+    batches: Vec<BindGroup>,
     pieces: Vec<PieceGroups>,
 }
 
 struct PieceGroups {
     profile: Option<BindGroup>,
-    splatting: SplattingGroups,
-}
-
-enum SplattingGroups {
-    Quads { splat: BindGroup, resolve: BindGroup },
-    Tiles(BindGroup),
+    splat: Vec<BindGroup>,
+    resolve: Option<BindGroup>,
 }
 
 impl Pipeline {
@@ -140,14 +94,9 @@ impl Pipeline {
             boundary: asset.fresnel.then(|| Boundary::new(device, &common)),
             segments: Segments::new(device, &common, &asset),
             profile: asset.heterogeneous.then(|| Profile::new(device, &common)),
-            splatting: match path {
-                SplatPath::Quads => Splatting::Quads(
-                    Outlines::new(device, &common),
-                    Splat::new(device, &common, &asset),
-                    Resolve::new(device, &common, &asset),
-                ),
-                SplatPath::Tiles => Splatting::Tiles(Gather::new(device, &common, &asset)),
-            },
+            outlines: Outlines::new(device, &common, path),
+            batches: Batches::new(device, &common, path),
+            splatting: Splatting::new(device, &common, &asset, path),
             frame: FrameBuffers::new(device, &common, &asset),
             common,
             asset,
@@ -163,10 +112,7 @@ impl Pipeline {
 
     /// How kernels are summed.
     pub(super) fn path(&self) -> SplatPath {
-        match self.splatting {
-            Splatting::Quads(..) => SplatPath::Quads,
-            Splatting::Tiles(_) => SplatPath::Tiles,
-        }
+        self.splatting.path()
     }
 
     /// Takes extinction and albedo from an edited asset's parameters.
@@ -178,11 +124,7 @@ impl Pipeline {
 
     /// Compiles what the material needs and is not there.
     fn renew_variant(&mut self, device: &Device) {
-        let variant = self.asset.variant();
-        match &mut self.splatting {
-            Splatting::Quads(_, splat, _) => splat.set_variant(device, variant),
-            Splatting::Tiles(gather) => gather.set_variant(device, variant),
-        }
+        self.splatting.set_variant(device, self.asset.variant());
     }
 
     /// The same for one instance, whose medium others share until now.
@@ -284,7 +226,12 @@ impl Pipeline {
     /// As [`Self::new`].
     pub(super) fn level(&self, device: &Device, asset: &Asset) -> Result<Self> {
         let mut level = self.with(device, AssetBuffers::allocate(device, asset, self.path())?);
-        level.renew_variant(device);
+        if level.asset.pixel_state().kept == self.asset.pixel_state().kept {
+            level.renew_variant(device);
+        } else {
+            // Another number of shards.
+            level.splatting = Splatting::new(device, &level.common, &level.asset, level.path());
+        }
         Ok(level)
     }
 
@@ -298,6 +245,8 @@ impl Pipeline {
             boundary: self.boundary.clone(),
             segments: self.segments.clone(),
             profile: self.profile.clone(),
+            outlines: self.outlines.clone(),
+            batches: self.batches.clone(),
             splatting: self.splatting.clone(),
             frame: FrameBuffers::new(device, &self.common, &asset),
             reuse: true,
@@ -406,6 +355,7 @@ impl Pipeline {
         for (buffer, bytes) in [(&targets.radiance, RADIANCE), (&targets.counters, COUNTERS)] {
             encoder.clear_buffer(buffer, 0, Some(bytes * tile.pixels()));
         }
+        encoder.clear_buffer(&targets.census, 0, None);
     }
 
     /// Records one ray of every pixel of a tile, added to the picture.
@@ -429,49 +379,33 @@ impl Pipeline {
         if let Some((clip, group)) = clip {
             clip.record(r, group);
         }
-        if let (Splatting::Quads(outlines, ..), Some(group)) = (&self.splatting, &groups.outlines) {
-            outlines.record(r, group, &self.asset);
-        }
+        self.outlines.record(r, &groups.outlines, &self.asset);
+        self.batches.record(r, &groups.batches, &self.asset);
         for (k, piece) in groups.pieces.iter().enumerate() {
             if let (Some(profile), Some(group)) = (&self.profile, &piece.profile) {
                 profile.record(r, group, targets, k);
             }
-            match (&self.splatting, &piece.splatting) {
-                (Splatting::Quads(_, quads, end), SplattingGroups::Quads { splat, resolve }) => {
-                    quads.record(r, splat, targets, k);
-                    end.record(r, resolve, targets, k);
-                }
-                (Splatting::Tiles(gather), SplattingGroups::Tiles(group)) => {
-                    gather.record(r, group, targets, k);
-                }
-                _ => {}
-            }
+            self.splatting.record(r, &piece.splat, piece.resolve.as_ref(), &self.asset, targets, k);
         }
     }
 
     fn groups(&self, device: &Device, targets: &Targets) -> Groups {
         let (asset, frame) = (&self.asset, &self.frame);
+        let each = |bind: &dyn Fn(&Shard) -> BindGroup| asset.shards.iter().map(bind).collect::<Vec<_>>();
         let piece = |k: usize| PieceGroups {
             profile: self.profile.as_ref().map(|p| p.bind(device, asset, targets, k)),
-            splatting: match &self.splatting {
-                Splatting::Quads(_, splat, resolve) => SplattingGroups::Quads {
-                    splat: splat.bind(device, asset, targets, k),
-                    resolve: resolve.bind(device, targets, k),
-                },
-                Splatting::Tiles(gather) => SplattingGroups::Tiles(gather.bind(device, asset, targets, k)),
-            },
+            splat: each(&|s| self.splatting.bind(device, s, targets, k)),
+            resolve: self.splatting.bind_resolve(device, targets, k),
         };
         Groups {
-            lighting: self.lighting.bind(device, asset, frame),
-            fold: self.fold.bind(device, asset, frame),
-            slopes: self.slopes.bind(device, asset),
+            lighting: each(&|s| self.lighting.bind(device, asset, s, frame)),
+            fold: each(&|s| self.fold.bind(device, asset, s, frame)),
+            slopes: each(&|s| self.slopes.bind(device, asset, s)),
             surface: self.surface.bind(device, asset, targets),
             boundary: self.boundary.as_ref().map(|b| b.bind(device, asset, frame, targets)),
             segments: self.segments.bind(device, targets),
-            outlines: match &self.splatting {
-                Splatting::Quads(outlines, ..) => Some(outlines.bind(device, asset, targets)),
-                Splatting::Tiles(_) => None,
-            },
+            outlines: each(&|s| self.outlines.bind(device, s, targets)),
+            batches: each(&|s| self.batches.bind(device, s, targets)),
             pieces: (0..MAX_PIECES).map(piece).collect(),
         }
     }

@@ -17,6 +17,7 @@ pub(super) const LIGHTING: &str =
 pub(super) const FOLD: &str = source!("shared/view", "shared/medium", "fold");
 pub(super) const SLOPES: &str = source!("shared/view", "shared/medium", "slopes");
 pub(super) const OUTLINES: &str = source!("shared/view", "shared/medium", "shared/kernel", "outlines");
+pub(super) const BATCHES: &str = source!("shared/view", "shared/medium", "batches");
 pub(super) const SPLAT: &str = source!(
     "shared/view",
     "shared/medium",
@@ -25,26 +26,43 @@ pub(super) const SPLAT: &str = source!(
     "shared/contribution",
     "splat"
 );
-pub(super) const RESOLVE: &str =
-    source!("shared/view", "shared/medium", "shared/kernel", "shared/profile", "shared/emission", "resolve");
-macro_rules! gather {
+macro_rules! resolve {
     ($end:literal) => {
         source!(
             "shared/view",
             "shared/medium",
             "shared/kernel",
             "shared/profile",
-            "shared/contribution",
             "shared/emission",
-            "gather",
+            "resolve",
             $end
         )
     };
 }
 
+pub(super) const RESOLVE_BLENDED: &str = resolve!("resolve_blended");
+pub(super) const RESOLVE_KEPT: &str = resolve!("resolve_kept");
+
+macro_rules! gather {
+    ($($end:literal),*) => {
+        source!(
+            "shared/view",
+            "shared/medium",
+            "shared/kernel",
+            "shared/profile",
+            "shared/contribution",
+            "gather",
+            $($end),*
+        )
+    };
+}
+
 /// Where lanes of a subgroup can talk, and where they cannot.
-pub(super) const GATHER_BY_LANES: &str = gather!("gather_lanes");
-pub(super) const GATHER_PLAINLY: &str = gather!("gather_plain");
+pub(super) const GATHER_BY_LANES: &str = gather!("shared/emission", "gather_join", "gather_lanes");
+pub(super) const GATHER_PLAINLY: &str = gather!("shared/emission", "gather_join", "gather_plain");
+/// The same where sums are kept from shard to shard.
+pub(super) const KEEP_BY_LANES: &str = gather!("gather_keep", "gather_lanes");
+pub(super) const KEEP_PLAINLY: &str = gather!("gather_keep", "gather_plain");
 
 pub(super) const LIMITS: &str = source!("limits");
 pub(super) const CLIP: &str = source!("shared/view", "clip");

@@ -2,7 +2,7 @@
 
 use super::bindings::empty_buffer;
 use super::faults::allocate;
-use super::pipeline::SplatPath;
+use super::splatting::SplatPath;
 use super::tiles::{Budget, Tile};
 use crate::Result;
 use crate::rendered::MAX_PIECES;
@@ -16,12 +16,15 @@ use wgpu::{
 pub(super) const SUM_FORMAT: TextureFormat = TextureFormat::Rgba32Float;
 /// Format of the attachment that the surface pass does not write.
 pub(super) const MARKER_FORMAT: TextureFormat = TextureFormat::R8Unorm;
-/// Bytes of one piece's indirect arguments: an indexed draw (five words), a dispatch over cells of 8 × 8 pixels (three), one over
-/// the listed tiles of 16 × 16 (three, one unused).
-pub(super) const ARGUMENTS: u64 = 48;
+/// Bytes of one piece's indirect arguments: a dispatch over cells of 8 × 8 pixels (three words, one unused), one over the listed
+/// tiles of 16 × 16 (likewise).
+pub(super) const ARGUMENTS: u64 = 32;
 /// Where the dispatches are in them.
-pub(super) const OVER_CELLS: u64 = 20;
-pub(super) const OVER_TILES: u64 = 32;
+pub(super) const OVER_CELLS: u64 = 0;
+pub(super) const OVER_TILES: u64 = 16;
+
+/// Bytes of the census.
+pub(super) const CENSUS: u64 = 64;
 
 /// State of all pixels together stays below this, so that large pictures leave memory to others.
 pub(super) const TOTAL: u64 = 512 << 20;
@@ -32,7 +35,9 @@ pub(super) const BOUNDARY: u64 = 48;
 pub(super) const RADIANCE: u64 = 16;
 pub(super) const COUNTERS: u64 = 16;
 const PIECE: u64 = 16;
-const CELL: u64 = 8;
+const CELL: u64 = 16;
+/// Numerator and denominator, as tiles keep them from shard to shard.
+const KEPT: u64 = 32;
 /// Where the lists of tiles begin, and the bytes of one tile in them.
 const LISTS: u64 = 256;
 const LISTED: u64 = 4;
@@ -56,8 +61,12 @@ pub(super) struct Targets {
     pub arguments: Buffer,
     /// Tiles, padded as `stride`.
     tile_stride: u64,
-    /// Least start and greatest end of each piece in cells of 8 × 8 pixels.
+    /// Least start, greatest end and greatest start of each piece in cells of 8 × 8 pixels.
     pub cells: Buffer,
+    /// See [`crate::rendered::Census`]; [`CENSUS`] bytes.
+    pub census: Buffer,
+    /// Sums of the current piece, where samples are several shards and drawn by tiles.
+    pub kept: Buffer,
     pub marker: TextureView,
     pub numerator: TextureView,
     pub denominator: TextureView,
@@ -70,6 +79,8 @@ pub(super) struct PixelState {
     pub fresnel: bool,
     /// The density varies.
     pub heterogeneous: bool,
+    /// Sums are kept from shard to shard.
+    pub kept: bool,
 }
 
 impl PixelState {
@@ -78,6 +89,7 @@ impl PixelState {
         Self {
             fresnel: self.fresnel || other.fresnel,
             heterogeneous: self.heterogeneous || other.heterogeneous,
+            kept: self.kept || other.kept,
         }
     }
 }
@@ -88,13 +100,14 @@ pub(super) fn budget(device: &Device, state: PixelState, total: u64) -> Budget {
     let profile = if state.heterogeneous { PROFILE } else { 0 };
     let boundary = if state.fresnel { BOUNDARY } else { 0 };
     let pieces = PIECE * MAX_PIECES as u64;
+    let kept = if state.kept { KEPT } else { 0 };
     Budget {
         side: limits.max_texture_dimension_2d,
         binding: limits.max_storage_buffer_binding_size.min(limits.max_buffer_size),
         total,
         pixel_binding: profile.max(pieces),
         // Three vectors of state, two textures, the marker, and what is read back.
-        pixel_total: CROSSINGS + boundary + pieces + profile + 3 * 16 + 2 * 16 + 1 + 2 * 16,
+        pixel_total: CROSSINGS + boundary + pieces + profile + kept + 3 * 16 + 2 * 16 + 1 + 2 * 16,
     }
 }
 
@@ -160,6 +173,8 @@ impl Targets {
             ),
             tile_stride,
             cells: buffer("cells", CELL * MAX_PIECES as u64 * cell_stride, state),
+            census: buffer("census", CENSUS, read),
+            kept: buffer("kept", if needs.kept { KEPT * pixels } else { 0 }, state),
             marker: texture("marker", MARKER_FORMAT, tile.size),
             numerator: texture("numerator", SUM_FORMAT, blended),
             denominator: texture("denominator", SUM_FORMAT, blended),

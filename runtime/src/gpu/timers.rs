@@ -17,6 +17,7 @@ pub(super) enum Pass {
     Segments,
     Profile,
     Outlines,
+    Batches,
     Splat,
     Resolve,
 }
@@ -25,7 +26,7 @@ pub(super) enum Pass {
 pub(super) const PASSES: usize = Pass::ALL.len();
 
 impl Pass {
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 11] = [
         Self::Lighting,
         Self::Fold,
         Self::Slopes,
@@ -34,6 +35,7 @@ impl Pass {
         Self::Segments,
         Self::Profile,
         Self::Outlines,
+        Self::Batches,
         Self::Splat,
         Self::Resolve,
     ];
@@ -54,6 +56,7 @@ impl Pass {
             Self::Segments => "segments",
             Self::Profile => "profile",
             Self::Outlines => "outlines",
+            Self::Batches => "batches",
             Self::Splat => "splat",
             Self::Resolve => "resolve",
         }

@@ -1,10 +1,11 @@
 //! Plain data shared with the shaders. Layouts follow WGSL's rules: a vector of three starts at a multiple of 16 and
 //! the scalar after it fills its last four bytes. The tests check sizes and places against the shaders' source.
 
+use crate::cpu::shown::sight;
 use crate::frame::{Frame, FrameLight};
 use crate::usable::MOST_EXTINCTION;
 use bytemuck::{Pod, Zeroable};
-use diaphane_formats::asset::{Asset, Info};
+use diaphane_formats::asset::{Asset, DensityGrid, Info};
 use diaphane_formats::encoding::Encoding;
 use diaphane_formats::kernel;
 use diaphane_formats::slopes::{CELL_RADIUS, STEEPEST, means_share};
@@ -109,7 +110,9 @@ pub(super) struct MediumUniform {
     pub means: Vec3,
     pub most_extinction: f32,
     pub steepest: f32,
-    pub unused: [u32; 3],
+    pub first: u32,
+    pub total: u32,
+    pub sight: f32,
 }
 
 impl MediumUniform {
@@ -127,6 +130,7 @@ impl MediumUniform {
         let mut medium = Self {
             cell_variance: (CELL_RADIUS * sharpness).powi(2) / 5.0,
             samples: asset.samples.len() as u32,
+            total: asset.samples.len() as u32,
             encoding,
             epsilon,
             grid_min: grid.map_or(Vec3::ZERO, |g| g.min.into()),
@@ -138,15 +142,17 @@ impl MediumUniform {
             steepest: STEEPEST / sharpness,
             ..Self::zeroed()
         };
-        medium.set_material(info, grid.is_some());
+        let least = |g: &DensityGrid| g.values.iter().map(|v| v[0].to_f32()).fold(f32::INFINITY, f32::min);
+        medium.set_material(info, grid.map(least));
         medium
     }
 
-    /// Takes extinction and albedo from an edited asset's parameters; `grid` says whether it has a density grid.
-    pub fn set_material(&mut self, info: &Info, grid: bool) {
+    /// Takes extinction and albedo from an edited asset's parameters; `grid` is the least density of its grid if it has one.
+    pub fn set_material(&mut self, info: &Info, grid: Option<f32>) {
         let extinction = DVec3::from(info.extinction);
-        let along = if grid { extinction } else { extinction * info.uniform_density };
+        let along = if grid.is_some() { extinction } else { extinction * info.uniform_density };
         self.kappa = along.min(DVec3::splat(MOST_EXTINCTION)).as_vec3();
+        self.sight = sight(self.kappa.min_element() * grid.unwrap_or(1.0));
         self.extinction = extinction.as_vec3();
         self.ratio = info.ratio();
         self.albedo = DVec3::from(info.albedo).as_vec3();
@@ -276,7 +282,10 @@ mod tests {
             triangles,
             means,
             most_extinction,
-            steepest
+            steepest,
+            first,
+            total,
+            sight
         );
         mirrors!(
             LightRecord,

@@ -2,7 +2,7 @@
 // Twin of `cpu::lighting::from_folded`; crate::fold states the formulas.
 
 @group(1) @binding(0) var<storage, read> centroids: array<vec4f>;
-@group(1) @binding(1) var<storage, read> linear: array<u32>;      // [sample][channel][coefficient], two f16 a word
+@group(1) @binding(1) var<storage, read> linear: array<u32>;      // of all samples: [sample][channel][coefficient], two f16 a word
 // Coefficients, vectors, channels (bits); then F and, where the phase function minds the camera, its three changes.
 @group(1) @binding(2) var<storage, read> ambient: array<vec4f>;
 @group(1) @binding(3) var<storage, read_write> values: array<vec4f>;
@@ -17,7 +17,8 @@ fn fold_lights(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups
     if (sample >= medium.samples) {
         return;
     }
-    let before = values[sample];
+    let place = medium.first + sample;
+    let before = values[place];
     if (before.w <= 0.0) {
         return;
     }
@@ -30,7 +31,7 @@ fn fold_lights(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups
         deviation = away / max(length(away), 1e-30) - view.origin / max(length(view.origin), 1e-30);
     }
     let words = count / 2u;
-    let start = sample * header.z * words;
+    let start = place * header.z * words;
     var sum = vec3f(0.0);
     for (var word = 0u; word < words; word++) {
         let red = unpack2x16float(linear[start + word]);
@@ -50,5 +51,5 @@ fn fold_lights(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups
             sum += light * vec3f(red[half], green[half], blue[half]);
         }
     }
-    values[sample] = vec4f(before.xyz + medium.albedo * max(sum, vec3f(0.0)), before.w);
+    values[place] = vec4f(before.xyz + medium.albedo * max(sum, vec3f(0.0)), before.w);
 }

@@ -1,10 +1,12 @@
 // Gather pass: the kernels along the current piece of every pixel of a tile, summed in registers, and what comes of
-// them added to the picture: splat and resolve in one, without blending.
+// them added to the picture: splat and resolve in one, without blending. (Where the samples are several shards sums are kept
+// from one to the next, and the resolve pass follows.)
 //
 // A workgroup first finds the clusters of 64 samples that rays of its tile may meet, then those of their samples; the
 // bits of `marks` keep them in order, so that the sums do not depend on threads. Each thread then has two pixels side by
-// side in each half of the tile. How those that are listed are added, `add_listed`, and the entry point follow in
-// gather_lanes.wgsl or gather_plain.wgsl.
+// side in each half of the tile. Where sums begin and what becomes of them, `begin` and `finish`, follow in gather_join.wgsl or
+// gather_keep.wgsl; how those that are listed are added, `add_listed`, and the entry point in gather_lanes.wgsl or
+// gather_plain.wgsl.
 
 // Position and sharpness of each sample, then a sphere around the kernels of each cluster of 64.
 @group(1) @binding(0) var<storage, read> samples: array<vec4f>;
@@ -12,9 +14,6 @@
 @group(1) @binding(2) var<storage, read> tiles: array<u32>;      // column and row of those with pixels inside, 16 bits each
 @group(1) @binding(3) var<storage, read> piece: array<vec4f>;
 @group(1) @binding(4) var<storage, read> profile: array<vec4f>;
-@group(1) @binding(5) var<storage, read_write> front: array<vec4f>;
-@group(1) @binding(6) var<storage, read_write> radiance: array<vec4f>;
-@group(1) @binding(7) var<storage, read_write> counters: array<vec4u>;
 
 const SOURCE: u32 = 4u;
 const SIDE: u32 = 16u;          // of a tile, pixels
@@ -23,7 +22,6 @@ const CLUSTER: u32 = 64u;       // samples of a cluster, and threads of a workgr
 const WORDS: u32 = 32u;
 const ROUND: u32 = 1024u;       // bits of all words: clusters looked at together
 const GROUP: u32 = 16u;         // clusters whose samples are looked at together
-const DARK: f32 = 16.0;         // optical depth behind which nothing is seen in single precision
 // Below this cosine of the half angle a cone is not used: everything is a candidate.
 const LEAST_COSINE: f32 = 0.1;
 
@@ -83,11 +81,7 @@ fn mark(bit: u32) {
 
 // The greatest distance at which rays see kernels that enter the object at `start` at the latest and leave it at `end`.
 fn sight(start: f32, end: f32) -> f32 {
-    if (HETEROGENEOUS) {
-        return end;
-    }
-    let least = max(min(medium.kappa.x, min(medium.kappa.y, medium.kappa.z)), 1e-30);
-    return min(end, start + DARK / least);
+    return min(end, start + medium.sight);
 }
 
 fn kernel_of(sample: u32) -> Kernel {
@@ -160,12 +154,6 @@ fn bound(ray: Ray) {
     }
 }
 
-fn finish(ray: Ray, sums: Sums) {
-    if (is_inside(ray)) {
-        join(ray.index, ray.ends, sums.numerator, sums.denominator, sums.kernels);
-    }
-}
-
 // Lists those that are marked, in order, behind the first `before`; `base` is what the first bit of the thread's word
 // stands for.
 fn list_marked(local: u32, before: u32, base: u32) {
@@ -217,6 +205,10 @@ fn gather(tile: vec2u, local: u32, lane: u32, lanes: u32) {
     }
     let cone = cone_of(tile * SIDE, reach.x, reach.y);
     var sums: array<PairSums, HALVES>;
+    for (var half = 0u; half < HALVES; half++) {
+        let rays = rays_of(tile, half, local);
+        sums[half] = PairSums(begin(rays.left), begin(rays.right));
+    }
     let total = (medium.samples + CLUSTER - 1u) / CLUSTER;
     for (var first = 0u; first < total; first += ROUND) {
         for (var bit = local; bit < min(ROUND, total - first); bit += CLUSTER) {

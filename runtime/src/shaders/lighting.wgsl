@@ -158,7 +158,7 @@ fn light_samples(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgrou
     }
     let weight = weights[sample];
     if (weight <= 0.0) {
-        values[sample] = vec4f(0.0);
+        values[medium.first + sample] = vec4f(0.0);
         return;
     }
     let x = centroids[sample].xyz;
@@ -179,7 +179,7 @@ fn light_samples(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgrou
     var first = 0u;
     var sum = vec3f(0.0);
     if (view.light_count > PORTION) {
-        let earlier = values[sample];
+        let earlier = values[medium.first + sample];
         first = u32(earlier.w);
         sum = earlier.xyz;
     }
@@ -195,7 +195,7 @@ fn light_samples(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgrou
             let g = clamp(medium.mean_cosine, -light.most_cosine, light.most_cosine);
             let scattered = arriving.irradiance * henyey_greenstein(g, -arriving.towards, towards_camera);
             if (light.table != NO_TABLE) {
-                let known = exact[light.table * medium.samples + sample];
+                let known = exact[light.table * medium.total + medium.first + sample];
                 sum += scattered * exp(-medium.extinction * known.x) * known.y;
             } else {
                 towards.x[waiting] = arriving.towards.x;
@@ -219,8 +219,8 @@ fn light_samples(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgrou
         }
     }
     if (end < view.light_count) {
-        values[sample] = vec4f(sum, f32(end));
+        values[medium.first + sample] = vec4f(sum, f32(end));
         return;
     }
-    values[sample] = vec4f(min(medium.albedo * sum, vec3f(most_source())), weight);
+    values[medium.first + sample] = vec4f(min(medium.albedo * sum, vec3f(most_source())), weight);
 }

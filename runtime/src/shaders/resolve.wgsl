@@ -1,5 +1,6 @@
 // Resolve pass: radiance of the current piece of each pixel as seen through the pieces in front, added to the
-// picture. Twin of `reconstruct::Along` and the end of `piece_radiance`.
+// picture. Twin of `reconstruct::Along` and the end of `piece_radiance`. Where sums come from, `sums_at`, follows in
+// resolve_blended.wgsl or resolve_kept.wgsl.
 override HETEROGENEOUS: bool = false;
 
 @group(1) @binding(0) var<storage, read> piece: array<vec4f>;
@@ -7,8 +8,12 @@ override HETEROGENEOUS: bool = false;
 @group(1) @binding(2) var<storage, read_write> front: array<vec4f>;
 @group(1) @binding(3) var<storage, read_write> radiance: array<vec4f>;
 @group(1) @binding(4) var<storage, read_write> counters: array<vec4u>;
-@group(1) @binding(5) var numerators: texture_2d<f32>;
-@group(1) @binding(6) var denominators: texture_2d<f32>;
+
+struct Sums {
+    numerator: vec3f,
+    kernels: u32,
+    denominator: vec3f,
+}
 
 @compute @workgroup_size(8, 8)
 fn resolve(@builtin(global_invocation_id) pixel: vec3u) {
@@ -20,6 +25,6 @@ fn resolve(@builtin(global_invocation_id) pixel: vec3u) {
     if (ends.y <= ends.x) {
         return;
     }
-    let numerator = textureLoad(numerators, pixel.xy, 0);
-    join(index, ends, numerator.xyz, textureLoad(denominators, pixel.xy, 0).xyz, u32(numerator.w));
+    let sums = sums_at(pixel.xy, index);
+    join(index, ends, sums.numerator, sums.denominator, sums.kernels);
 }

@@ -1,5 +1,5 @@
 // Segments pass: from each pixel's sorted crossings to at most four inside pieces, where the winding number is
-// positive. Twin of `visibility::inside_pieces`. Also starts the ray's counters and switches on the draws of the
+// positive. Twin of `visibility::inside_pieces`. Also starts the ray's counters and switches on the passes of the
 // pieces that occur.
 override FRESNEL: bool = false;
 
@@ -7,9 +7,8 @@ const SLOTS: u32 = 8u;
 const STATE: u32 = 10u;
 const BOUNDARY: u32 = 12u;
 const MAX_PIECES: u32 = 4u;
-const ARGUMENTS: u32 = 12u; // indexed draw (5), dispatch over 8 x 8 pixels (3), over listed tiles (3), unused
-const BATCH: u32 = 64u;     // samples of an instance of the draw
-const INDICES: u32 = 768u;  // of an instance: four triangles a sample
+const ARGUMENTS: u32 = 8u;  // of a piece: dispatch over 8 x 8 pixels (3), unused, over listed tiles (3), unused
+const OVER_TILES: u32 = 4u; // where the second begins
 const LISTS: u32 = 64u;     // where the lists of tiles of each piece begin; then come a mark for every tile and piece
 
 @group(1) @binding(0) var<storage, read> crossings: array<u32>;
@@ -22,12 +21,13 @@ const LISTS: u32 = 64u;     // where the lists of tiles of each piece begin; the
 // Rays that hit, pieces dropped, kernels, rays without a kernel.
 @group(1) @binding(5) var<storage, read_write> counters: array<vec4u>;
 @group(1) @binding(6) var<storage, read_write> arguments: array<atomic<u32>>;
-// Least start and greatest end of each piece over the 8 x 8 pixels of a workgroup: piece k of cell c at
+// Least start, greatest end and greatest start of each piece over the 8 x 8 pixels of a workgroup: piece k of cell c at
 // [k * stride + c].
-@group(1) @binding(7) var<storage, read_write> cells: array<vec2f>;
+@group(1) @binding(7) var<storage, read_write> cells: array<vec4f>;
 
 var<workgroup> cell_start: array<atomic<u32>, 4>;
 var<workgroup> cell_end: array<atomic<u32>, 4>;
+var<workgroup> cell_latest: array<atomic<u32>, 4>;
 
 fn through(index: u32, slot: u32) -> f32 {
     if (FRESNEL) {
@@ -46,6 +46,7 @@ fn segments(
     if (local < MAX_PIECES) {
         atomicStore(&cell_start[local], 0xffffffffu);
         atomicStore(&cell_end[local], 0u);
+        atomicStore(&cell_latest[local], 0u);
     }
     workgroupBarrier();
     if (all(pixel.xy < view.tile_size)) {
@@ -55,9 +56,10 @@ fn segments(
     if (local < MAX_PIECES) {
         let stride = arrayLength(&cells) / MAX_PIECES;
         let start = atomicLoad(&cell_start[local]);
-        var range = vec2f(1e30, -1.0);
+        var range = vec4f(1e30, -1.0, 0.0, 0.0);
         if (start != 0xffffffffu) {
-            range = vec2f(bitcast<f32>(start), bitcast<f32>(atomicLoad(&cell_end[local])));
+            range = vec4f(bitcast<f32>(start), bitcast<f32>(atomicLoad(&cell_end[local])),
+                bitcast<f32>(atomicLoad(&cell_latest[local])), 0.0);
         }
         cells[local * stride + cell.y * cell_count.x + cell.x] = range;
         if (range.x <= range.y) {
@@ -71,10 +73,10 @@ fn list_tile(k: u32, tile: vec2u, columns: u32) {
     let stride = (arrayLength(&arguments) - LISTS) / (2u * MAX_PIECES);
     let mark = LISTS + (MAX_PIECES + k) * stride + tile.y * columns + tile.x;
     if (atomicExchange(&arguments[mark], 1u) == 0u) {
-        let place = atomicAdd(&arguments[k * ARGUMENTS + 8u], 1u);
+        let place = atomicAdd(&arguments[k * ARGUMENTS + OVER_TILES], 1u);
         atomicStore(&arguments[LISTS + k * stride + place], tile.x | (tile.y << 16u));
-        atomicMax(&arguments[k * ARGUMENTS + 9u], 1u);
-        atomicMax(&arguments[k * ARGUMENTS + 10u], 1u);
+        atomicMax(&arguments[k * ARGUMENTS + OVER_TILES + 1u], 1u);
+        atomicMax(&arguments[k * ARGUMENTS + OVER_TILES + 2u], 1u);
     }
 }
 
@@ -104,6 +106,7 @@ fn cut(index: u32) {
                     pieces[count * stride + index] = vec4f(start, t, entry, through(index, slot));
                     atomicMin(&cell_start[count], bitcast<u32>(start));
                     atomicMax(&cell_end[count], bitcast<u32>(t));
+                    atomicMax(&cell_latest[count], bitcast<u32>(start));
                     count++;
                 } else {
                     dropped++;
@@ -119,11 +122,9 @@ fn cut(index: u32) {
             pieces[k * stride + index] = vec4f(0.0);
         } else if (atomicLoad(&arguments[k * ARGUMENTS]) == 0u) {
             let groups = (view.tile_size + vec2u(7u)) / 8u;
-            atomicMax(&arguments[k * ARGUMENTS + 1u], (medium.samples + BATCH - 1u) / BATCH);
-            atomicMax(&arguments[k * ARGUMENTS + 5u], groups.x);
-            atomicMax(&arguments[k * ARGUMENTS + 6u], groups.y);
-            atomicMax(&arguments[k * ARGUMENTS + 7u], 1u);
-            atomicMax(&arguments[k * ARGUMENTS], INDICES);
+            atomicMax(&arguments[k * ARGUMENTS + 1u], groups.y);
+            atomicMax(&arguments[k * ARGUMENTS + 2u], 1u);
+            atomicMax(&arguments[k * ARGUMENTS], groups.x);
         }
     }
     front[index] = vec4f(1.0, 1.0, 1.0, 0.0);

@@ -4,7 +4,7 @@
 @group(1) @binding(0) var<storage, read> samples: array<vec4f>;   // position, sharpness
 @group(1) @binding(1) var<storage, read> centroids: array<vec4f>; // where values hold, density there
 @group(1) @binding(2) var<storage, read> spokes: array<vec4f>;    // NEIGHBOURS a sample: gradient, index (bits)
-@group(1) @binding(3) var<storage, read> values: array<vec4f>;    // v at the centroid, weight
+@group(1) @binding(3) var<storage, read> values: array<vec4f>;    // of all samples: v at the centroid, weight
 // SOURCE a sample: v at the kernel's centre and weight, then the slope of each channel.
 @group(1) @binding(4) var<storage, read_write> sources: array<vec4f>;
 
@@ -20,7 +20,7 @@ fn find_slopes(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups
     if (sample >= medium.samples) {
         return;
     }
-    let own = values[sample];
+    let own = values[medium.first + sample];
     let centroid = centroids[sample];
     let kernel = samples[sample];
     let to_centre = kernel.xyz - centroid.xyz;

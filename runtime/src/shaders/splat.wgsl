@@ -8,6 +8,7 @@
 @group(1) @binding(4) var<storage, read> outlines: array<Outline>;
 // Whether a sample's kernel may meet the current piece of any pixel; those that do not draw nothing.
 @group(1) @binding(5) var<storage, read> shown: array<u32>;
+@group(1) @binding(6) var<storage, read> batches: array<u32>; // that have such samples
 
 const SOURCE: u32 = 4u;
 const TRIANGLE_PIXELS: f32 = 9.0;
@@ -48,8 +49,8 @@ const HEXAGON = array<vec2f, 6>(
 
 // Vertex 6 k + c is corner c of the k-th sample of its instance.
 @vertex
-fn outline(@builtin(vertex_index) vertex: u32, @builtin(instance_index) batch: u32) -> Splat {
-    let index = BATCH * batch + vertex / 6u;
+fn outline(@builtin(vertex_index) vertex: u32, @builtin(instance_index) instance: u32) -> Splat {
+    let index = BATCH * batches[instance] + vertex / 6u;
     if (index >= medium.samples || shown[index] == 0u) {
         return Splat(vec4f(2.0, 2.0, 0.0, 1.0), vec4f(0.0), vec4f(0.0), vec3f(0.0), vec3f(0.0), vec3f(0.0));
     }

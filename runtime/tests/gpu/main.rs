@@ -1,12 +1,14 @@
 //! The GPU against its CPU twin, on synthetic assets. Without an adapter the tests say "skipped" and pass, unless
 //! DIAPHANE_REQUIRE_GPU=1 asks them to fail.
 
+mod census;
 mod edits;
 mod endurance;
 mod faults;
 mod host;
 mod objects;
 mod scenes;
+mod shards;
 
 use diaphane_formats::asset::Asset;
 use diaphane_formats::encoding::Encoding;
@@ -248,12 +250,12 @@ fn whole_pictures_agree() {
 fn same_bits_every_time() {
     let asset = torus().build();
     let frame = Frame::new(&scene(outside()), &asset.info).unwrap();
-    let (Some(mut first), Some(mut second)) = (gpu(&asset), gpu(&asset)) else {
-        return;
-    };
-    let picture = first.render(&frame, None).unwrap().picture;
-    assert!(picture == first.render(&frame, None).unwrap().picture);
-    assert!(picture == second.render(&frame, None).unwrap().picture);
+    for path in [SplatPath::Quads, SplatPath::Tiles] {
+        let Some(mut first) = gpu_with(&asset, path) else { return };
+        let picture = first.render(&frame, None).unwrap().picture;
+        assert!(picture == first.render(&frame, None).unwrap().picture);
+        assert!(picture == gpu_with(&asset, path).unwrap().render(&frame, None).unwrap().picture);
+    }
 }
 
 #[test]

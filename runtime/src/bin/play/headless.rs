@@ -46,6 +46,7 @@ pub fn run(args: &Args, output: &Path) -> Result<()> {
         eprintln!("warning: {warning}");
     }
     player.set_reuse(args.reuse);
+    player.set_counting(args.stats.is_some());
     let mut stats = Stats::new(&player, &frame, args.frames);
     let mut rendered = None;
     for _ in 0..args.frames {

@@ -18,6 +18,8 @@ pub struct Stats {
     adapter: String,
     /// How a GPU summed the kernels.
     splat: Option<&'static str>,
+    /// Parts that the samples were cut into, where a GPU's bindings are too small for all of them.
+    shards: Option<usize>,
     width: u32,
     height: u32,
     samples_per_pixel: u32,
@@ -73,6 +75,7 @@ impl Stats {
             backend,
             adapter,
             splat: player.path().map(SplatPath::name),
+            shards: player.shards(),
             width: frame.width,
             height: frame.height,
             samples_per_pixel: frame.samples_per_pixel,
@@ -109,6 +112,7 @@ impl Stats {
     pub fn write(mut self, player: &Player, path: &Path) -> Result<()> {
         (self.backend, self.adapter) = player.describe();
         self.splat = player.path().map(SplatPath::name);
+        self.shards = player.shards();
         self.frame_ms = Spread::of(&self.frame_times);
         self.pass_ms = self.pass_times.iter().map(|(name, times)| (*name, Spread::of(times))).collect();
         let mut json = serde_json::to_string_pretty(&self)?;

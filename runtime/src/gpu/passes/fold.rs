@@ -4,6 +4,7 @@ use super::super::asset::AssetBuffers;
 use super::super::bindings::{Slot, compute, group, layout, pipeline_layout};
 use super::super::frame::FrameBuffers;
 use super::super::shaders;
+use super::super::shard::Shard;
 use super::super::timers::Pass;
 use super::Recorder;
 use wgpu::{BindGroup, BindGroupLayout, ComputePipeline, Device, ShaderStages};
@@ -25,15 +26,18 @@ impl Fold {
         Self { layout, pipeline }
     }
 
-    pub fn bind(&self, device: &Device, asset: &AssetBuffers, frame: &FrameBuffers) -> BindGroup {
-        let resources = [&asset.centroids, &frame.linear, &frame.ambient, &asset.values];
+    pub fn bind(
+        &self,
+        device: &Device,
+        asset: &AssetBuffers,
+        shard: &Shard,
+        frame: &FrameBuffers,
+    ) -> BindGroup {
+        let resources = [&shard.centroids, &frame.linear, &frame.ambient, &asset.values];
         group(device, "fold", &self.layout, resources.map(|b| b.as_entire_binding()).into())
     }
 
-    pub fn record(&self, r: &mut Recorder, group: &BindGroup, asset: &AssetBuffers) {
-        r.compute(Pass::Fold, &self.pipeline, group, |pass| {
-            let [columns, rows] = asset.sample_groups();
-            pass.dispatch_workgroups(columns, rows, 1);
-        });
+    pub fn record(&self, r: &mut Recorder, groups: &[BindGroup], asset: &AssetBuffers) {
+        r.over_samples(Pass::Fold, &self.pipeline, groups, &asset.shards, 1);
     }
 }

@@ -4,6 +4,7 @@
 use super::super::asset::{AssetBuffers, Variant};
 use super::super::bindings::{Slot, compute, group, layout, pipeline_layout};
 use super::super::shaders;
+use super::super::shard::Shard;
 use super::super::targets::{ARGUMENTS, OVER_TILES, Targets};
 use super::super::timers::Pass;
 use super::Recorder;
@@ -19,20 +20,29 @@ pub(crate) struct Gather {
     module: ShaderModule,
     variant: Variant,
     pipeline: ComputePipeline,
+    /// Whether sums are kept for the resolve pass.
+    kept: bool,
 }
 
 impl Gather {
     pub fn new(device: &Device, common: &BindGroupLayout, asset: &AssetBuffers) -> Self {
         use Slot::{Read, Write};
         let slots = [Read, Read, Read, Read, Read, Write, Write, Write];
-        let layout = layout(device, "gather", ShaderStages::COMPUTE, &slots);
+        let kept = asset.pixel_state().kept;
+        let slots = if kept { &slots[..6] } else { &slots[..] };
+        let layout = layout(device, "gather", ShaderStages::COMPUTE, slots);
         let pipeline_layout = pipeline_layout(device, "gather", common, &layout);
         let lanes = device.features().contains(Features::SUBGROUP);
-        let source = if lanes { shaders::GATHER_BY_LANES } else { shaders::GATHER_PLAINLY };
+        let source = match (kept, lanes) {
+            (false, true) => shaders::GATHER_BY_LANES,
+            (false, false) => shaders::GATHER_PLAINLY,
+            (true, true) => shaders::KEEP_BY_LANES,
+            (true, false) => shaders::KEEP_PLAINLY,
+        };
         let module = shaders::module(device, "gather", source);
         let variant = asset.variant();
         let pipeline = Self::pipeline(device, &pipeline_layout, &module, variant);
-        Self { layout, pipeline_layout, module, variant, pipeline }
+        Self { layout, pipeline_layout, module, variant, pipeline, kept }
     }
 
     /// Compiles the pass anew where another material needs other code.
@@ -52,25 +62,24 @@ impl Gather {
         compute(device, "gather", layout, module, &variant.constants())
     }
 
-    pub fn bind(&self, device: &Device, asset: &AssetBuffers, targets: &Targets, piece: usize) -> BindGroup {
+    pub fn bind(&self, device: &Device, shard: &Shard, targets: &Targets, piece: usize) -> BindGroup {
         let t = targets;
-        let resources = vec![
-            asset.samples.as_entire_binding(),
-            asset.sources.as_entire_binding(),
+        let mut resources = vec![
+            shard.samples.as_entire_binding(),
+            shard.sources.as_entire_binding(),
             t.tiles(piece),
             t.piece(piece),
             t.profile.as_entire_binding(),
-            t.front.as_entire_binding(),
-            t.radiance.as_entire_binding(),
-            t.counters.as_entire_binding(),
         ];
+        let sums = if self.kept { &[&t.kept][..] } else { &[&t.front, &t.radiance, &t.counters] };
+        resources.extend(sums.iter().map(|b| b.as_entire_binding()));
         group(device, "gather", &self.layout, resources)
     }
 
     /// Does nothing where no pixel has this piece.
-    pub fn record(&self, r: &mut Recorder, group: &BindGroup, targets: &Targets, piece: usize) {
+    pub fn record(&self, r: &mut Recorder, groups: &[BindGroup], targets: &Targets, piece: usize) {
         let at = ARGUMENTS * piece as u64 + OVER_TILES;
-        r.compute(Pass::Splat, &self.pipeline, group, |pass| {
+        r.over_shards(Pass::Splat, &self.pipeline, groups, |pass, _| {
             pass.dispatch_workgroups_indirect(&targets.arguments, at);
         });
     }

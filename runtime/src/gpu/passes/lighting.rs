@@ -4,6 +4,7 @@ use super::super::asset::AssetBuffers;
 use super::super::bindings::{Slot, compute, group, layout, pipeline_layout};
 use super::super::frame::FrameBuffers;
 use super::super::shaders;
+use super::super::shard::Shard;
 use super::super::timers::Pass;
 use super::Recorder;
 use diaphane_formats::harmonics;
@@ -37,33 +38,34 @@ impl Lighting {
         Self { layout, pipeline }
     }
 
-    pub fn bind(&self, device: &Device, asset: &AssetBuffers, frame: &FrameBuffers) -> BindGroup {
+    pub fn bind(
+        &self,
+        device: &Device,
+        asset: &AssetBuffers,
+        shard: &Shard,
+        frame: &FrameBuffers,
+    ) -> BindGroup {
         let resources = [
-            &asset.centroids,
-            &asset.weights,
-            &asset.depth,
-            &asset.boundary,
+            &shard.centroids,
+            &shard.weights,
+            &shard.depth,
+            &shard.boundary,
             &frame.lights,
             &frame.exact,
             &asset.values,
             &asset.recurrence,
             &asset.bands,
-            &asset.packed,
+            &shard.packed,
         ];
         group(device, "lighting", &self.layout, resources.map(|b| b.as_entire_binding()).into())
     }
 
     /// For so many lights.
-    pub fn record(&self, r: &mut Recorder, group: &BindGroup, asset: &AssetBuffers, lights: usize) {
+    pub fn record(&self, r: &mut Recorder, groups: &[BindGroup], asset: &AssetBuffers, lights: usize) {
         let portions = (lights as u32).div_ceil(PORTION).max(1);
         if portions > 1 {
             r.encoder.clear_buffer(&asset.values, 0, None);
         }
-        r.compute(Pass::Lighting, &self.pipeline, group, |pass| {
-            let [columns, rows] = asset.sample_groups();
-            for _ in 0..portions {
-                pass.dispatch_workgroups(columns, rows, 1);
-            }
-        });
+        r.over_samples(Pass::Lighting, &self.pipeline, groups, &asset.shards, portions);
     }
 }

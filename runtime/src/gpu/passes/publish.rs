@@ -70,7 +70,7 @@ impl Publish {
         let [width, height] = tile.size.map(|n| n as f32);
         render.set_pipeline(&self.pipeline);
         render.set_viewport(x, y, width, height, 0.0, 1.0);
-        render.set_bind_group(0, r.common, &[r.view_offset]);
+        render.set_bind_group(0, &r.common[0], &[r.view_offset]);
         render.set_bind_group(1, group, &[]);
         render.draw(0..3, 0..1);
     }

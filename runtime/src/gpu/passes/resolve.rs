@@ -13,25 +13,34 @@ use wgpu::{BindGroup, BindGroupLayout, BindingResource, ComputePipeline, Device,
 pub(crate) struct Resolve {
     layout: BindGroupLayout,
     pipeline: ComputePipeline,
+    /// Whether tiles kept the sums, or quads blended them.
+    kept: bool,
 }
 
 impl Resolve {
     pub fn new(device: &Device, common: &BindGroupLayout, asset: &AssetBuffers) -> Self {
         use Slot::{Read, Texture, Write};
-        let slots = [Read, Read, Write, Write, Write, Texture, Texture];
+        let kept = asset.pixel_state().kept;
+        let sums = if kept { &[Read][..] } else { &[Texture, Texture] };
+        let slots = [&[Read, Read, Write, Write, Write], sums].concat();
         let layout = layout(device, "resolve", ShaderStages::COMPUTE, &slots);
+        let source = if kept { shaders::RESOLVE_KEPT } else { shaders::RESOLVE_BLENDED };
         let pipeline_layout = pipeline_layout(device, "resolve", common, &layout);
-        let module = shaders::module(device, "resolve", shaders::RESOLVE);
+        let module = shaders::module(device, "resolve", source);
         let constants = [("HETEROGENEOUS", f64::from(u8::from(asset.heterogeneous)))];
         let pipeline = compute(device, "resolve", &pipeline_layout, &module, &constants);
-        Self { layout, pipeline }
+        Self { layout, pipeline, kept }
     }
 
     pub fn bind(&self, device: &Device, targets: &Targets, piece: usize) -> BindGroup {
         let t = targets;
         let mut resources = vec![t.piece(piece)];
         resources.extend([&t.profile, &t.front, &t.radiance, &t.counters].map(|b| b.as_entire_binding()));
-        resources.extend([&t.numerator, &t.denominator].map(BindingResource::TextureView));
+        if self.kept {
+            resources.push(t.kept.as_entire_binding());
+        } else {
+            resources.extend([&t.numerator, &t.denominator].map(BindingResource::TextureView));
+        }
         group(device, "resolve", &self.layout, resources)
     }
 

@@ -3,6 +3,7 @@
 use super::super::asset::AssetBuffers;
 use super::super::bindings::{Slot, compute, group, layout, pipeline_layout};
 use super::super::shaders;
+use super::super::shard::Shard;
 use super::super::timers::Pass;
 use super::Recorder;
 use wgpu::{BindGroup, BindGroupLayout, ComputePipeline, Device, ShaderStages};
@@ -24,15 +25,12 @@ impl Slopes {
         Self { layout, pipeline }
     }
 
-    pub fn bind(&self, device: &Device, asset: &AssetBuffers) -> BindGroup {
-        let resources = [&asset.samples, &asset.centroids, &asset.spokes, &asset.values, &asset.sources];
+    pub fn bind(&self, device: &Device, asset: &AssetBuffers, shard: &Shard) -> BindGroup {
+        let resources = [&shard.samples, &shard.centroids, &shard.spokes, &asset.values, &shard.sources];
         group(device, "slopes", &self.layout, resources.map(|b| b.as_entire_binding()).into())
     }
 
-    pub fn record(&self, r: &mut Recorder, group: &BindGroup, asset: &AssetBuffers) {
-        r.compute(Pass::Slopes, &self.pipeline, group, |pass| {
-            let [columns, rows] = asset.sample_groups();
-            pass.dispatch_workgroups(columns, rows, 1);
-        });
+    pub fn record(&self, r: &mut Recorder, groups: &[BindGroup], asset: &AssetBuffers) {
+        r.over_samples(Pass::Slopes, &self.pipeline, groups, &asset.shards, 1);
     }
 }

@@ -3,7 +3,8 @@
 use super::super::asset::{AssetBuffers, Variant};
 use super::super::bindings::{Slot, filled_buffer, group, layout, options, pipeline_layout};
 use super::super::shaders;
-use super::super::targets::{ARGUMENTS, SUM_FORMAT, Targets};
+use super::super::shard::{BATCH, DRAW, Shard};
+use super::super::targets::{SUM_FORMAT, Targets};
 use super::super::timers::Pass;
 use super::Recorder;
 use wgpu::{
@@ -13,9 +14,6 @@ use wgpu::{
     RenderPassDescriptor, RenderPipeline, RenderPipelineDescriptor, ShaderModule, ShaderStages, StoreOp,
     TextureView, VertexState,
 };
-
-/// Samples of an instance: a draw of few corners costs adapters as much as one of a few hundred.
-const BATCH: u16 = 64;
 
 const ADD: BlendComponent = BlendComponent {
     src_factor: BlendFactor::One,
@@ -37,7 +35,7 @@ pub(crate) struct Splat {
 
 impl Splat {
     pub fn new(device: &Device, common: &BindGroupLayout, asset: &AssetBuffers) -> Self {
-        let layout = layout(device, "splat", ShaderStages::VERTEX_FRAGMENT, &[Slot::Read; 6]);
+        let layout = layout(device, "splat", ShaderStages::VERTEX_FRAGMENT, &[Slot::Read; 7]);
         let pipeline_layout = pipeline_layout(device, "splat", common, &layout);
         let module = shaders::module(device, "splat", shaders::SPLAT);
         let variant = asset.variant();
@@ -89,20 +87,28 @@ impl Splat {
         })
     }
 
-    pub fn bind(&self, device: &Device, asset: &AssetBuffers, targets: &Targets, piece: usize) -> BindGroup {
+    pub fn bind(&self, device: &Device, shard: &Shard, targets: &Targets, piece: usize) -> BindGroup {
         let resources = vec![
-            asset.samples.as_entire_binding(),
-            asset.sources.as_entire_binding(),
+            shard.samples.as_entire_binding(),
+            shard.sources.as_entire_binding(),
             targets.piece(piece),
             targets.profile.as_entire_binding(),
-            asset.outlines.as_entire_binding(),
-            asset.shown(piece),
+            shard.outlines.as_entire_binding(),
+            shard.shown(piece),
+            shard.listed(piece),
         ];
         group(device, "splat", &self.layout, resources)
     }
 
     /// Only clears where no pixel has this piece.
-    pub fn record(&self, r: &mut Recorder, group: &BindGroup, targets: &Targets, piece: usize) {
+    pub fn record(
+        &self,
+        r: &mut Recorder,
+        groups: &[BindGroup],
+        asset: &AssetBuffers,
+        targets: &Targets,
+        piece: usize,
+    ) {
         let mut render = r.encoder.begin_render_pass(&RenderPassDescriptor {
             label: Some("splat"),
             color_attachments: &[cleared(&targets.numerator), cleared(&targets.denominator)],
@@ -113,16 +119,20 @@ impl Splat {
         });
         render.set_pipeline(&self.pipeline);
         Recorder::aim(r.common, r.view_offset, r.tile, &mut render);
-        render.set_bind_group(1, group, &[]);
         render.set_index_buffer(self.indices.slice(..), IndexFormat::Uint16);
-        render.draw_indexed_indirect(&targets.arguments, ARGUMENTS * piece as u64);
+        for ((shard, common), group) in asset.shards.iter().zip(r.common).zip(groups) {
+            render.set_bind_group(0, common, &[r.view_offset]);
+            render.set_bind_group(1, group, &[]);
+            render.draw_indexed_indirect(&shard.batches, DRAW * piece as u64);
+        }
     }
 }
 
-/// Corners of the four triangles of each hexagon of a batch, whose corners are numbered as those of a strip.
+/// Corners of the four triangles of each hexagon of a batch (a draw of few corners costs adapters as much as one of a few
+/// hundred), whose corners are numbered as those of a strip.
 fn hexagons() -> Vec<u16> {
     let triangles = [[0, 1, 2], [2, 1, 3], [2, 3, 4], [4, 3, 5]];
-    (0..BATCH).flat_map(|k| triangles.as_flattened().iter().map(move |c| 6 * k + c)).collect()
+    (0..BATCH as u16).flat_map(|k| triangles.as_flattened().iter().map(move |c| 6 * k + c)).collect()
 }
 
 fn cleared(view: &TextureView) -> Option<RenderPassColorAttachment<'_>> {

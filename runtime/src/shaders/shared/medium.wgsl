@@ -3,7 +3,7 @@ struct Medium {
     kappa: vec3f,           // extinction along a ray, per unit of profile density, or absolute without a profile
     cell_variance: f32,     // of the cell that a sample's values are the mean of, in units of 1 / sharpness^2
     extinction: vec3f,      // per unit of density length
-    samples: u32,
+    samples: u32,           // at hand: those of a shard
     ratio: vec3f,           // extinction over the reference extinction
     encoding: u32,          // 0: transmittance, 1: reciprocal, 2: depth
     albedo: vec3f,
@@ -17,6 +17,9 @@ struct Medium {
     means: vec3f,           // s of formats/src/slopes.rs for baked light
     most_extinction: f32,   // the largest channel's, at density 1
     steepest: f32,          // largest slope per unit of sharpness
+    first: u32,             // of `samples` samples, among `total`
+    total: u32,
+    sight: f32,             // length of medium behind which nothing is seen in single precision
 }
 
 @group(0) @binding(1) var<uniform> medium: Medium;

@@ -80,6 +80,9 @@ fn statistics(ui: &mut Ui, numbers: &Numbers) {
         row("picture", format!("{} x {}", numbers.size[0], numbers.size[1]));
         row("rays a pixel", format!("{} of {}", numbers.rays, numbers.rays_wanted));
         row("samples", format!("{} of {}", counters.samples_drawn, numbers.samples));
+        let census = &counters.census;
+        let share = |n: u64| n / census.views.max(1);
+        row("shown, hidden", format!("{}, {}", share(census.samples_shown), share(census.samples_hidden)));
         row("splats a ray", format!("{:.1}", counters.splats_per_ray()));
         if counters.pieces_dropped > 0 {
             row("pieces not drawn", counters.pieces_dropped.to_string());

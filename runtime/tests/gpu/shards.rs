@@ -1,0 +1,115 @@
+//! Assets with more samples than an adapter binds at once: devices are told to bind less than they can, and hold the renderer to it.
+
+use super::objects::{Object, ball, torus, uneven_grid};
+use super::scenes::{self, level, outside, scene};
+use super::{gpu, gpu_with};
+use diaphane_formats::asset::Asset;
+use diaphane_runtime::exact::{DepthTracer, ExactDepths};
+use diaphane_runtime::frame::Frame;
+use diaphane_runtime::gpu::{GpuDevice, GpuRenderer, SplatPath, instance};
+use diaphane_runtime::rendered::Rendered;
+use diaphane_runtime::{Error, Result};
+
+/// Holds the spokes of 4,681 samples.
+const MEBIBYTE: u64 = 1 << 20;
+
+fn within(binding: u64, asset: &Asset, path: SplatPath) -> Result<GpuRenderer> {
+    GpuRenderer::on(GpuDevice::open(&instance(), None)?.with_binding(binding)?, asset, Some(path))
+}
+
+/// Small, so that pixels' state fits too and is not drawn in tiles, whose rays meet other faces at edges.
+fn frame(asset: &Asset, change: impl Fn(&mut diaphane_formats::scene::Scene)) -> Frame {
+    let mut scene = scene(outside());
+    (scene.image.width, scene.image.height, scene.image.samples_per_pixel) = (40, 36, 2);
+    change(&mut scene);
+    Frame::new(&scene, &asset.info).unwrap()
+}
+
+/// Largest difference as a share of the peak.
+fn difference(a: &Rendered, b: &Rendered) -> f32 {
+    let [a, b] = [a, b].map(|r| r.picture.pixels.as_flattened());
+    let peak = b.iter().fold(0.0, |p: f32, v| p.max(*v));
+    assert!(peak > 0.0);
+    a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max) / peak
+}
+
+fn compare(name: &str, asset: &Asset, frame: &Frame, exact: Option<&ExactDepths>, bound: f32) {
+    for path in [SplatPath::Quads, SplatPath::Tiles] {
+        let Some(mut whole) = gpu_with(asset, path) else { return };
+        let mut cut = within(MEBIBYTE, asset, path).unwrap();
+        assert_eq!((whole.shards(), cut.shards()), (1, 3), "{name}: {} samples", asset.samples.len());
+        let expected = whole.render(frame, exact).unwrap();
+        let got = cut.render(frame, exact).unwrap();
+        assert_eq!(cut.tiles(), 1);
+        let worst = difference(&got, &expected);
+        println!("{name} by {}: {worst:.1e} of the peak", path.name());
+        assert!(worst <= bound, "{name} by {}: {worst}", path.name());
+        // Batches of 64 samples are cut at other places.
+        let count = |r: &Rendered| {
+            let mut counters = r.counters;
+            (counters.census.batches, counters.census.batches_drawn) = (0, 0);
+            counters
+        };
+        assert_eq!(count(&got), count(&expected), "{name} by {}", path.name());
+        // What is kept from shard to shard is not kept from frame to frame.
+        assert!(cut.render(frame, exact).unwrap().picture == got.picture);
+    }
+}
+
+#[test]
+fn an_asset_in_three_shards_is_the_same_picture() {
+    let fine = Object { spacing: 0.073, ..ball() };
+    let asset = fine.build();
+    compare("ball", &asset, &frame(&asset, |_| ()), None, 1e-6);
+    let crowd = frame(&asset, |s| s.lights = scenes::crowd(300));
+    compare("ball, more lights than a dispatch takes", &asset, &crowd, None, 1e-6);
+    let asset =
+        Object { density: Some(uneven_grid()), ior: 1.5, extinction: [2.0, 5.0, 11.0], ..fine }.build();
+    compare("uneven, coloured, glassy ball", &asset, &frame(&asset, |_| ()), None, 1e-6);
+    let asset = Object { spacing: 0.0445, ..torus() }.build();
+    let two_pieces = frame(&asset, |s| s.camera = level());
+    compare("torus", &asset, &two_pieces, None, 1e-6);
+    let lit_inside = frame(&asset, scenes::put_light_inside);
+    let exact = DepthTracer::new(&asset).unwrap().trace(&lit_inside, &[0, lit_inside.scene_lights - 1]);
+    compare("torus with exact depths", &asset, &lit_inside, Some(&exact), 1e-6);
+}
+
+#[test]
+fn folded_lights_take_fewer_bands_where_their_table_does_not_fit() {
+    let asset = Object { spacing: 0.073, ..ball() }.build();
+    let suns = frame(&asset, |s| {
+        s.camera = scenes::far();
+        scenes::add_suns(s, 40);
+    });
+    // Seven bands instead of ten; of a wrong sample's they would be another picture.
+    compare("folded lights", &asset, &suns, None, 0.02);
+}
+
+#[test]
+fn materials_reach_all_shards() {
+    let asset = Object { spacing: 0.073, ..ball() }.build();
+    let Some(mut whole) = gpu(&asset) else { return };
+    let mut cut = within(MEBIBYTE, &asset, SplatPath::Tiles).unwrap();
+    let info = diaphane_formats::asset::Info { extinction: [2.0, 5.0, 8.0], ..asset.info.clone() };
+    whole.set_material(&info);
+    cut.set_material(&info);
+    let frame = frame(&asset, |_| ());
+    let (got, expected) = (cut.render(&frame, None).unwrap(), whole.render(&frame, None).unwrap());
+    assert!(difference(&got, &expected) <= 1e-6);
+}
+
+#[test]
+fn what_cannot_be_cut_is_refused_with_the_limit_and_the_way_out() {
+    let asset = Object { spacing: 0.3, ..ball() }.build();
+    if gpu(&asset).is_none() {
+        return;
+    }
+    // The mesh: 5,120 triangles are 61 kB.
+    let error = within(48 << 10, &asset, SplatPath::Tiles).err().unwrap();
+    let line = error.to_string();
+    assert!(matches!(error, Error::Gpu(_)), "{line}");
+    for part in ["triangles", "max_storage_buffer_binding_size", "CPU backend"] {
+        assert!(line.contains(part), "{line}");
+    }
+    assert!(!line.contains('\n'), "{line}");
+}
