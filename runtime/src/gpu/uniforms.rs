@@ -38,7 +38,9 @@ pub(super) struct ViewUniform {
     pub rays: u32,
     pub means: f32,
     pub first_scene_light: u32,
-    pub unused: u32,
+    pub environment: u32,
+    pub negligible: f32,
+    pub unused: [u32; 3],
 }
 
 /// What a frame's rays need to know about its lights.
@@ -50,6 +52,10 @@ pub(super) struct LightLayout {
     pub first_scene_light: u32,
     /// Share of the lights that baked means serve.
     pub means: f32,
+    /// Records in front that stand for an environment.
+    pub environment: u32,
+    /// What a sample may leave out: [`crate::fold::Plan::negligible`].
+    pub negligible: f32,
 }
 
 impl ViewUniform {
@@ -83,7 +89,9 @@ impl ViewUniform {
             rays,
             means: lights.means,
             first_scene_light: lights.first_scene_light,
-            unused: 0,
+            environment: lights.environment,
+            negligible: lights.negligible,
+            unused: [0; 3],
         }
     }
 }
@@ -172,12 +180,22 @@ pub(super) struct LightRecord {
     pub cos_outer: f32,
     pub table: u32,
     pub most_cosine: f32,
-    pub unused: [u32; 2],
+    pub share: f32,
+    pub baked: u32,
+}
+
+/// A table that replaces or corrects a light's baked depths.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct TableUse {
+    /// Which one.
+    pub slot: u32,
+    /// 1: exact depths; below: that share of corrections.
+    pub share: f32,
 }
 
 impl LightRecord {
-    /// A light, and its exact depth table if it has one.
-    pub fn new(light: &FrameLight, table: Option<u32>) -> Self {
+    /// A light, the table that it has if any, and whether its baked light is evaluated and not folded.
+    pub fn new(light: &FrameLight, table: Option<TableUse>, baked: bool) -> Self {
         Self {
             position: light.position,
             kind: light.kind as u32,
@@ -185,9 +203,10 @@ impl LightRecord {
             cos_inner: light.cos_inner,
             colour: light.colour,
             cos_outer: light.cos_outer,
-            table: table.unwrap_or(u32::MAX),
+            table: table.map_or(u32::MAX, |t| t.slot),
             most_cosine: light.most_cosine,
-            unused: [0; 2],
+            share: table.map_or(0.0, |t| t.share),
+            baked: u32::from(baked),
         }
     }
 }
@@ -253,7 +272,9 @@ mod tests {
             alpha,
             rays,
             means,
-            first_scene_light
+            first_scene_light,
+            environment,
+            negligible
         );
         mirrors!(
             MediumUniform,
@@ -288,7 +309,9 @@ mod tests {
             colour,
             cos_outer,
             table,
-            most_cosine
+            most_cosine,
+            share,
+            baked
         );
     }
 }

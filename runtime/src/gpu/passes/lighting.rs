@@ -6,12 +6,9 @@ use super::super::frame::FrameBuffers;
 use super::super::shaders;
 use super::super::timers::Pass;
 use super::Recorder;
+use crate::fold::PORTION;
 use diaphane_formats::harmonics;
 use wgpu::{BindGroup, BindGroupLayout, ComputePipeline, Device, ShaderStages};
-
-/// Most lights of a dispatch. Mesa's software adapter (22.3.6) ends the loops of a thread after 65,535 rounds altogether: a
-/// light of fourteen bands takes up to 130.
-const PORTION: u32 = 256;
 
 /// See lighting.wgsl.
 #[derive(Clone)]
@@ -29,7 +26,7 @@ impl Lighting {
         let module = shaders::module(device, "lighting", shaders::LIGHTING);
         let constants = [
             ("FRESNEL", f64::from(u8::from(asset.fresnel))),
-            ("PORTION", f64::from(PORTION)),
+            ("PORTION", PORTION as f64),
             ("BOUNDARY_ORDER", asset.boundary_order as f64),
             ("BOUNDARY_BYTES", harmonics::bytes(asset.boundary_order) as f64),
         ];
@@ -55,7 +52,7 @@ impl Lighting {
 
     /// For so many lights.
     pub fn record(&self, r: &mut Recorder, group: &BindGroup, asset: &AssetBuffers, lights: usize) {
-        let portions = (lights as u32).div_ceil(PORTION).max(1);
+        let portions = lights.div_ceil(PORTION).max(1);
         if portions > 1 {
             r.encoder.clear_buffer(&asset.values, 0, None);
         }
