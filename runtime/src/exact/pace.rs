@@ -8,8 +8,8 @@ const LEAST: usize = 64;
 /// Turns milliseconds into numbers of samples.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Pace {
-    /// `None` before the first portion.
-    per_millisecond: Option<f64>,
+    /// Milliseconds a sample; `None` before the first portion.
+    each: Option<f64>,
 }
 
 impl Pace {
@@ -18,22 +18,25 @@ impl Pace {
         if !(milliseconds > 0.0) {
             return 0;
         }
-        self.per_millisecond.map_or(FIRST, |rate| ((rate * milliseconds) as usize).max(LEAST))
+        self.each.map_or(FIRST, |each| ((milliseconds / each) as usize).max(LEAST))
     }
 
-    /// What a portion has cost. The new speed is the mean of this one and the one before, so that one slow portion does not
-    /// change it.
+    /// What a portion has cost: halfway from what was known to that, so that one slow portion does not change it. Small portions
+    /// tell little: threads are awake and data is at hand.
     pub fn learn(&mut self, samples: usize, milliseconds: f64) {
         if samples == 0 || !(milliseconds.is_finite() && milliseconds >= 0.0) {
             return;
         }
-        let now = samples as f64 / milliseconds.max(1e-3);
-        self.per_millisecond = Some(self.per_millisecond.map_or(now, |old| 0.5 * (old + now)));
+        if samples < 2 * LEAST && self.each.is_some() {
+            return;
+        }
+        let now = milliseconds.max(1e-3) / samples as f64;
+        self.each = Some(self.each.map_or(now, |old| 0.5 * (old + now)));
     }
 
     /// Samples a second; 0 before the first portion.
     pub fn per_second(&self) -> f64 {
-        1e3 * self.per_millisecond.unwrap_or(0.0)
+        self.each.map_or(0.0, |each| 1e3 / each)
     }
 }
 
@@ -48,9 +51,11 @@ mod tests {
         pace.learn(FIRST, 1.0);
         assert_eq!(pace.samples(2.0), 2 * FIRST);
         pace.learn(FIRST, 0.25);
-        assert_eq!(pace.samples(2.0), 5 * FIRST);
+        // 1/256 and 1/1024 of a millisecond a sample: 1/409.6.
+        assert_eq!((pace.samples(2.0), pace.per_second().round()), (819, 409_600.0));
         pace.learn(10, f64::NAN);
         pace.learn(0, 1.0);
-        assert_eq!((pace.samples(2.0), pace.samples(1e-9)), (5 * FIRST, LEAST));
+        pace.learn(LEAST, 9.0);
+        assert_eq!((pace.samples(2.0), pace.samples(1e-9)), (819, LEAST));
     }
 }

@@ -118,6 +118,9 @@ struct Job {
     material: u64,
 }
 
+/// Part of a frame's milliseconds after which no further portion is begun: small ones are mostly waiting for threads.
+const ENOUGH: f64 = 0.75;
+
 /// The state of all lights.
 pub struct Schedule {
     settings: Settings,
@@ -312,7 +315,7 @@ impl Schedule {
         }
         let samples = work.samples();
         let mut spent = 0.0;
-        while spent < self.settings.milliseconds {
+        while spent < ENOUGH * self.settings.milliseconds {
             if self.job.is_none() {
                 let Some(&next) = queue.first() else { break };
                 if !self.make_room(samples) {
