@@ -20,6 +20,9 @@ pub struct Scene {
     pub environment: Option<Environment>,
     /// Any number of lights.
     pub lights: Vec<Light>,
+    /// Whether light i is marked `exact`: its optical depths are to be computed, not taken from the bake. Lights beyond the
+    /// end are not marked. Keep it in step with `lights` through [`Scene::mark_exact`] and [`Scene::remove_light`].
+    pub exact: Vec<bool>,
 }
 
 /// A pinhole camera.
@@ -194,6 +197,29 @@ impl Scene {
     pub fn ray_frame(&self) -> Result<RayFrame> {
         self.camera.frame(self.image.width, self.image.height)
     }
+
+    /// Whether a light is marked exact.
+    pub fn is_exact(&self, light: usize) -> bool {
+        light < self.lights.len() && self.exact.get(light).copied().unwrap_or(false)
+    }
+
+    /// Marks a light, or takes its mark away. Does nothing where there is no such light.
+    pub fn mark_exact(&mut self, light: usize, exact: bool) {
+        if light < self.lights.len() {
+            self.exact.resize(self.lights.len(), false);
+            self.exact[light] = exact;
+        }
+    }
+
+    /// Takes a light away, with its mark.
+    pub fn remove_light(&mut self, light: usize) {
+        if light < self.lights.len() {
+            self.lights.remove(light);
+        }
+        if light < self.exact.len() {
+            self.exact.remove(light);
+        }
+    }
 }
 
 /// Reads a scene file and the environment that it names.
@@ -210,12 +236,14 @@ pub fn load(path: &Path) -> Result<Scene> {
 pub fn parse_scene(text: &str, folder: &Path) -> Result<Scene> {
     let table = parse(text)?;
     let r = Reader::new(&table, "", &["camera", "image", "surface", "environment", "lights"])?;
+    let lights = r.tables("lights")?.into_iter().map(parse_light).collect::<Result<Vec<_>>>()?;
     let scene = Scene {
         camera: parse_camera(r.required_table("camera")?)?,
         image: parse_image(r.required_table("image")?)?,
         surface: r.table("surface")?.map_or(Ok(Surface::DEFAULT), parse_surface)?,
         environment: r.table("environment")?.map(|t| parse_environment(t, folder)).transpose()?,
-        lights: r.tables("lights")?.into_iter().map(parse_light).collect::<Result<_>>()?,
+        exact: lights.iter().map(|(_, exact)| *exact).collect(),
+        lights: lights.into_iter().map(|(light, _)| light).collect(),
     };
     scene.ray_frame()?;
     Ok(scene)
@@ -274,12 +302,13 @@ fn parse_environment(table: &Table, folder: &Path) -> Result<Environment> {
     Ok(Environment { picture, scale })
 }
 
-fn parse_light(table: &Table) -> Result<Light> {
+/// A light, and whether it is marked exact.
+fn parse_light(table: &Table) -> Result<(Light, bool)> {
     const PLACE: &str = "lights";
     let known: &[&str] = match type_of(table, PLACE)? {
-        "point" => &["type", "position", "intensity"],
-        "directional" => &["type", "direction", "irradiance"],
-        "spot" => &["type", "position", "direction", "intensity", "inner_degrees", "outer_degrees"],
+        "point" => &["type", "exact", "position", "intensity"],
+        "directional" => &["type", "exact", "direction", "irradiance"],
+        "spot" => &["type", "exact", "position", "direction", "intensity", "inner_degrees", "outer_degrees"],
         other => return Err(unknown_type(PLACE, other, &["point", "directional", "spot"])),
     };
     let r = Reader::new(table, PLACE, known)?;
@@ -290,28 +319,27 @@ fn parse_light(table: &Table) -> Result<Light> {
         }
         Ok(v)
     };
-    match type_of(table, PLACE)? {
-        "point" => {
-            Ok(Light::Point { position: r.required_vector("position")?, intensity: colour("intensity")? })
-        }
-        "directional" => Ok(Light::Directional {
+    let light = match type_of(table, PLACE)? {
+        "point" => Light::Point { position: r.required_vector("position")?, intensity: colour("intensity")? },
+        "directional" => Light::Directional {
             direction: r.required_direction("direction")?,
             irradiance: colour("irradiance")?,
-        }),
+        },
         _ => {
             let (inner, outer) = (r.required_number("inner_degrees")?, r.required_number("outer_degrees")?);
             if !(0.0 <= inner && inner <= outer && outer <= 180.0) {
                 return Err(Error::invalid("'lights': 0 <= inner_degrees <= outer_degrees <= 180 must hold"));
             }
-            Ok(Light::Spot {
+            Light::Spot {
                 position: r.required_vector("position")?,
                 direction: r.required_direction("direction")?,
                 intensity: colour("intensity")?,
                 cos_inner: inner.to_radians().cos(),
                 cos_outer: outer.to_radians().cos(),
-            })
+            }
         }
-    }
+    };
+    Ok((light, r.flag_or("exact", false)?))
 }
 
 #[cfg(test)]
@@ -343,6 +371,26 @@ mod tests {
         assert!(message(&GOOD.replace("height", "hieght")).contains("'height'"));
         assert!(message(&format!("{GOOD}[[lights]]\ntype='spott'")).contains("spot"));
         assert!(message(&format!("{GOOD}[[lights]]\ntype='point'\nposition=[0,0,0]")).contains("intensity"));
+    }
+
+    #[test]
+    fn lights_are_marked_exact_one_by_one() {
+        let light = |key: &str| {
+            format!("[[lights]]\ntype='directional'\n{key}\ndirection=[0,0,1]\nirradiance=[1,1,1]\n")
+        };
+        let text = format!("{GOOD}{}{}{}", light(""), light("exact=true"), light("exact=false"));
+        let mut scene = parse_scene(&text, Path::new(".")).unwrap();
+        assert_eq!(scene.exact, [false, true, false]);
+        scene.lights.push(scene.lights[0]);
+        assert!(scene.is_exact(1) && !scene.is_exact(3) && !scene.is_exact(4));
+        scene.remove_light(0);
+        scene.mark_exact(2, true);
+        scene.mark_exact(7, true);
+        assert_eq!((scene.lights.len(), scene.exact), (3, vec![true, false, true]));
+        assert!(
+            message(&format!("{GOOD}{}", light("exact=1"))).contains("'lights.exact' must be true or false")
+        );
+        assert!(message(&format!("{GOOD}{}", light("exakt=true"))).contains("did you mean 'exact'"));
     }
 
     #[test]

@@ -89,6 +89,8 @@ pub struct FrameLight {
     /// Mean cosines of phase functions are limited to this, up and down, for light from here; 1 but for lights that
     /// stand for an environment ([`ENVIRONMENT_MEAN_COSINE`]).
     pub most_cosine: f32,
+    /// Whether the scene marks it: its depths are to be exact.
+    pub exact: bool,
 }
 
 /// Kinds of lights, numbered as the shaders number them.
@@ -149,6 +151,7 @@ impl Frame {
         let centre = DVec3::from(info.centre);
         let rays = scene.ray_frame()?;
         let mut lights: Vec<FrameLight> = scene.lights.iter().map(|l| frame_light(l, centre)).collect();
+        lights.iter_mut().enumerate().for_each(|(i, light)| light.exact = scene.is_exact(i));
         let scene_lights = lights.len();
         if let Some(environment) = &scene.environment {
             lights.extend(environment_lights(environment));
@@ -176,11 +179,17 @@ impl Frame {
         1e33 / (self.least_distance * 1000.0).max(1.0)
     }
 
-    /// Share of the lights that the baked means serve: the others have exact depths at the centroids.
+    /// Share of the lights that the baked means serve, 0..1: the others have exact depths at the centroids. Lights on their way
+    /// from one to the other count in part.
     pub fn share_of_means(&self, exact: Option<&ExactDepths>) -> f32 {
         let count = self.lights.len();
-        let baked = (0..count).filter(|i| exact.and_then(|e| e.light(*i)).is_none()).count();
-        baked as f32 / count.max(1) as f32
+        let baked: f32 = (0..count).map(|i| 1.0 - exact.map_or(0.0, |e| e.share(i))).sum();
+        baked / count.max(1) as f32
+    }
+
+    /// The scene's lights that are marked exact, by index.
+    pub fn lights_marked(&self) -> Vec<usize> {
+        (0..self.scene_lights).filter(|&i| self.lights[i].exact).collect()
     }
 
     /// Point and spot lights inside the asset's bounding box, by index: their baked depth runs past them.
@@ -203,6 +212,7 @@ pub(crate) fn frame_light(light: &Light, centre: DVec3) -> FrameLight {
         cos_inner: -1.0,
         cos_outer: -1.0,
         most_cosine: 1.0,
+        exact: false,
     };
     match *light {
         Light::Point { position, intensity } => {
@@ -246,6 +256,7 @@ pub fn environment_lights(environment: &Environment) -> Vec<FrameLight> {
                 cos_inner: -1.0,
                 cos_outer: -1.0,
                 most_cosine: ENVIRONMENT_MEAN_COSINE,
+                exact: false,
             }
         })
         .collect()

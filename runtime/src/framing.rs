@@ -32,6 +32,7 @@ pub fn default_scene(info: &Info) -> Scene {
         image: ImageSize { width: 512, height: 512, samples_per_pixel: 4 },
         surface: Surface { reflection: true, specular: 0.5, roughness: 0.3 },
         environment: None,
+        exact: Vec::new(),
         lights: vec![
             light(DVec3::new(1.0, 0.6, 0.5), DVec3::new(1.0, 0.75, 0.5)),
             light(DVec3::new(-1.0, 0.3, 0.4), DVec3::new(0.3, 0.45, 0.8)),

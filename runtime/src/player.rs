@@ -2,7 +2,7 @@
 
 use crate::cpu::CpuRenderer;
 use crate::edit::Edit;
-use crate::exact::{DepthTracer, ExactDepths};
+use crate::exact::{DepthTracer, ExactDepths, ExactReport, Settings, Spread};
 use crate::frame::Frame;
 use crate::gpu::{GpuRenderer, SplatPath};
 use crate::rendered::Rendered;
@@ -31,7 +31,8 @@ pub enum LightMode {
     Baked,
     /// Rays to every light of the scene (those of the environment stay baked).
     Exact,
-    /// Rays to lights inside the object's bounding box, baked depths for the others.
+    /// Rays to lights inside the object's bounding box and to those that the scene marks exact; where depths are spread over
+    /// frames ([`Player::spread`]) to all that have come to rest. Baked depths for the others.
     Auto,
 }
 
@@ -54,6 +55,8 @@ pub struct Player {
     /// Of the material that is played.
     info: Info,
     tracer: DepthTracer,
+    /// Where depths are spread over frames.
+    spread: Option<Spread>,
     reuse: bool,
     counting: bool,
     last: Option<(Frame, LightMode, Rendered)>,
@@ -83,6 +86,7 @@ impl Player {
             baked: asset.info.clone(),
             info: asset.info.clone(),
             tracer,
+            spread: None,
             reuse: false,
             counting: false,
             last: None,
@@ -151,6 +155,26 @@ impl Player {
         }
     }
 
+    /// Spreads exact depths over the frames to come, as a window does ([`Spread`]): each frame does a part of the work, and lights
+    /// go from baked to exact depths without a jump. `None`, as at first, has all of a frame's depths in that frame. `asset` is
+    /// the one that the player was made of.
+    ///
+    /// # Errors
+    /// An asset whose mesh or medium makes no sense.
+    pub fn spread(&mut self, asset: &Asset, settings: Option<Settings>) -> Result<()> {
+        self.spread = settings.map(|s| Spread::new(asset, s)).transpose()?;
+        if let Some(spread) = &mut self.spread {
+            spread.set_material(&self.info);
+        }
+        self.last = None;
+        Ok(())
+    }
+
+    /// Whether the next frames will differ from the last one although nothing moves.
+    pub fn is_busy(&self) -> bool {
+        self.spread.as_ref().is_some_and(Spread::is_busy)
+    }
+
     /// Plays another extinction and albedo from the next frame on, relative to those that were baked: edits do not
     /// add up, and [`Edit::default`] brings the baked material back to the bit. Costs a few bytes to the GPU, or an
     /// operation a sample on the CPU.
@@ -163,6 +187,10 @@ impl Player {
             Engine::Cpu(cpu) => cpu.set_material(&self.info),
             Engine::Gpu(gpu) => gpu.set_material(&self.info),
             Engine::Closed => {}
+        }
+        self.tracer.set_material(&self.info);
+        if let Some(spread) = &mut self.spread {
+            spread.set_material(&self.info);
         }
         self.last = None;
         Ok(())
@@ -179,6 +207,7 @@ impl Player {
     /// The GPU failed.
     pub fn render(&mut self, frame: &Frame, mode: LightMode) -> Result<Rendered> {
         if self.reuse
+            && !self.is_busy()
             && let Some((last, last_mode, rendered)) = &self.last
             && last == frame
             && *last_mode == mode
@@ -186,7 +215,7 @@ impl Player {
             return Ok(Rendered { passes: Vec::new(), ..rendered.clone() });
         }
         let started = Instant::now();
-        let exact = self.exact(frame, mode);
+        let (exact, report) = self.exact(frame, mode);
         let exact_ms = started.elapsed().as_secs_f64() * 1e3;
         let mut rendered = match &mut self.engine {
             Engine::Cpu(cpu) => cpu.render(frame, exact.as_ref()),
@@ -196,6 +225,7 @@ impl Player {
         if exact.is_some() {
             rendered.passes.insert(0, ("exact depths", exact_ms));
         }
+        rendered.exact = report;
         if self.reuse {
             self.last = Some((frame.clone(), mode, rendered.clone()));
         }
@@ -266,20 +296,38 @@ impl Player {
         }
     }
 
-    /// The exact depths that `mode` asks for; `None` when the baked ones serve all lights.
-    fn exact(&mut self, frame: &Frame, mode: LightMode) -> Option<ExactDepths> {
-        let wanted = match mode {
-            LightMode::Baked => Vec::new(),
-            LightMode::Exact => (0..frame.scene_lights).collect(),
-            LightMode::Auto => frame.lights_inside(&self.info),
-        };
+    /// The exact depths that `mode` asks for, `None` when the baked ones serve all lights; and what they cost.
+    fn exact(&mut self, frame: &Frame, mode: LightMode) -> (Option<ExactDepths>, ExactReport) {
+        if let Some(spread) = &mut self.spread {
+            let exact = spread.advance(frame, mode);
+            return ((!exact.is_empty()).then_some(exact), spread.report().clone());
+        }
+        let wanted = mode.wanted(frame, &self.info);
         if wanted.is_empty() {
-            return None;
+            return (None, ExactReport { baked: frame.lights.len(), ..ExactReport::default() });
         }
         if !self.reuse {
             self.tracer.forget();
         }
-        Some(self.tracer.trace(frame, &wanted))
+        let exact = self.tracer.trace(frame, &wanted);
+        (Some(exact), self.tracer.report().clone())
+    }
+}
+
+impl LightMode {
+    /// Lights whose depths are exact where a frame has all of them at once, by index.
+    pub fn wanted(self, frame: &Frame, info: &Info) -> Vec<usize> {
+        match self {
+            Self::Baked => Vec::new(),
+            Self::Exact => (0..frame.scene_lights).collect(),
+            Self::Auto => {
+                let mut wanted = frame.lights_inside(info);
+                wanted.extend(frame.lights_marked());
+                wanted.sort_unstable();
+                wanted.dedup();
+                wanted
+            }
+        }
     }
 }
 

@@ -1,5 +1,6 @@
 //! What a backend hands back for one frame: the same for both.
 
+use crate::exact::ExactReport;
 use crate::fold::LightCounts;
 use diaphane_formats::picture::Picture;
 use serde::Serialize;
@@ -16,6 +17,8 @@ pub struct Rendered {
     pub counters: Counters,
     /// What became of the lights.
     pub lights: LightCounts,
+    /// Exact depths: what they cost and what they are good for.
+    pub exact: ExactReport,
     /// Name and milliseconds of every pass that ran, in order; passes that were reused are absent.
     pub passes: Vec<(&'static str, f64)>,
 }

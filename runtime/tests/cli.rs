@@ -158,6 +158,31 @@ fn writes_picture_and_statistics() {
 }
 
 #[test]
+fn lights_that_a_scene_marks_are_exact_unless_baked_light_is_asked_for() {
+    let folder = folder("marked");
+    std::fs::write(folder.join("m.scene.toml"), format!("{SCENE}exact = true\n")).unwrap();
+    let exact = |scene: &str, light: &[&str]| {
+        let arguments =
+            ["ball.dph", "--scene", scene, "--backend", "cpu", "--output", "o.exr", "--stats", "s.json"];
+        let done = play(&folder, &[&arguments[..], light].concat());
+        assert!(done.status.success(), "{done:?}");
+        let text = std::fs::read_to_string(folder.join("s.json")).unwrap();
+        let stats: serde_json::Value = serde_json::from_str(&text).unwrap();
+        let report = &stats["exact"];
+        let (exact, baked) = (report["exact"].as_u64().unwrap(), report["baked"].as_u64().unwrap());
+        assert_eq!(report["rays"].as_u64().unwrap(), exact * stats["samples"].as_u64().unwrap());
+        assert_eq!(report["errors"].as_array().unwrap().len() as u64, exact);
+        assert!(exact == 0 || report["errors"][0]["relative"].as_f64().unwrap() > 0.0);
+        (exact, baked)
+    };
+    assert_eq!(exact("a.scene.toml", &[]), (0, 1));
+    assert_eq!(exact("a.scene.toml", &["--light", "exact"]), (1, 0));
+    assert_eq!(exact("m.scene.toml", &[]), (1, 0));
+    assert_eq!(exact("m.scene.toml", &["--light", "auto"]), (1, 0));
+    assert_eq!(exact("m.scene.toml", &["--light", "baked"]), (0, 1));
+}
+
+#[test]
 fn plays_another_material() {
     let folder = folder("edits");
     let draw = |name: &str, more: &[&str]| {

@@ -3,9 +3,11 @@
 
 mod support;
 
+use diaphane_formats::asset::Asset;
 use diaphane_formats::directions::even_directions;
 use diaphane_formats::phase::Phase;
 use diaphane_formats::scene::Light;
+use diaphane_runtime::cpu::lighting::Lighting;
 use diaphane_runtime::fold::{MOST_SINGLE, Plan};
 use diaphane_runtime::frame::{Frame, LightKind};
 use diaphane_runtime::player::{Backend, LightMode, Player};
@@ -131,4 +133,108 @@ fn plans_name_every_light_once() {
     let plan = Plan::new(&frame, &asset.info, None);
     assert_eq!((plan.single.as_slice(), plan.folded.len(), plan.dark), (&[40][..], 40, 0));
     assert!(plan.folded.iter().all(|l| frame.lights[*l].kind == LightKind::Directional));
+}
+
+/// A few lights around the object, and many that are dim in different ways.
+fn mostly_dim(count: usize, dim: f64) -> Vec<Light> {
+    let directions = even_directions(count, 5);
+    let place = |(k, d): (usize, DVec3)| match k % 32 {
+        0 => point(HERE, d * 2.5, 20.0),
+        // As dim as others that are far.
+        k if k % 2 == 0 => point(HERE, d * 3.0, 9.0 * dim),
+        _ => point(HERE, d * 300.0, 9e4 * dim),
+    };
+    directions.into_iter().enumerate().map(place).collect()
+}
+
+/// The largest difference of two pictures over the brightest value of the second.
+fn of_peak(a: &Rendered, b: &Rendered) -> f32 {
+    let values = |r: &Rendered| r.picture.pixels.concat();
+    let peak = values(b).into_iter().fold(0.0, f32::max);
+    values(a).iter().zip(values(b)).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max) / peak
+}
+
+/// Lights one portion of fewer than `CULL_FROM` after the other, which leaves nothing out, summed sample by sample.
+fn every_value(asset: &Asset, lights: &[Light]) -> Vec<Vec3> {
+    let lighting = Lighting::new(&asset.info, &asset.samples);
+    let mut sum = vec![Vec3::ZERO; asset.samples.len()];
+    for few in lights.chunks(16) {
+        let frame = Frame::new(&scene(HERE, 8, 1, few.to_vec()), &asset.info).unwrap();
+        let all: Vec<usize> = (0..few.len()).collect();
+        let plan = Plan { single: all.clone(), order: all, ..Plan::default() };
+        let (values, skipped) = lighting.values(&asset.samples, &frame, None, &plan);
+        assert_eq!(skipped, 0.0);
+        sum.iter_mut().zip(values).for_each(|(s, v)| *s += v);
+    }
+    sum
+}
+
+#[test]
+fn samples_leave_out_what_brings_them_next_to_nothing() {
+    for phase in [Phase::Isotropic, Phase::HenyeyGreenstein { g: 0.6 }] {
+        let asset = ball(0.15, HERE, phase);
+        let lighting = Lighting::new(&asset.info, &asset.samples);
+        // Two portions; the dim ones together bring 5e-5 of the light, or too much to leave any out.
+        for (dim, some) in [(2e-6, true), (1e-3, false)] {
+            let lights = mostly_dim(512, dim);
+            let frame = Frame::new(&scene(HERE, 8, 1, lights.clone()), &asset.info).unwrap();
+            let plan = Plan::new(&frame, &asset.info, None);
+            let (values, skipped) = lighting.values(&asset.samples, &frame, None, &plan);
+            assert_eq!(skipped > 0.3, some, "{phase:?} {dim}: {skipped}");
+            // Beside those that are left out for the whole object.
+            let lit: Vec<Light> = plan.single.iter().map(|l| lights[*l]).collect();
+            let expected = every_value(&asset, &lit);
+            for (got, expected) in values.iter().zip(&expected) {
+                // Rounding of 512 terms beside the bound. Never more light.
+                let (least, most) = (*expected * (1.0 - 1.1e-4), *expected * (1.0 + 1e-5));
+                assert!(got.cmpge(least).all() && got.cmple(most).all(), "{phase:?} {dim}: {got} {expected}");
+            }
+        }
+    }
+}
+
+#[test]
+fn pictures_with_and_without_dim_lights_left_out_agree() {
+    let lights = mostly_dim(256, 2e-6);
+    let bright: Vec<Light> = lights.iter().copied().step_by(32).collect();
+    let (all, without) = (render(Phase::Isotropic, lights), render(Phase::Isotropic, bright));
+    assert!(all.lights.negligible_share.unwrap() > 0.3, "{:?}", all.lights);
+    assert!(of_peak(&without, &all) < 1e-4, "{}", of_peak(&without, &all));
+    assert_eq!(without.lights.negligible_share, Some(0.0));
+}
+
+#[test]
+fn dim_lights_count_where_bright_ones_do_not_arrive() {
+    // A light behind the object is bright outside and dark on the side that is seen. Those in front, a ten thousandth of it
+    // together at the surface, must not be left out there.
+    let mut asset = ball(0.15, HERE, Phase::Isotropic);
+    asset.info.extinction = [24.0; 3];
+    let seen_from = DVec3::new(0.4, 0.6, 4.6).normalize();
+    let mut lights = vec![point(HERE, -3.0 * seen_from, 100.0)];
+    lights.extend((0..64).map(|k| point(HERE, (3.0 + 0.01 * k as f64) * seen_from, 100.0 * 1e-4 / 64.0)));
+    let lighting = Lighting::new(&asset.info, &asset.samples);
+    let frame = Frame::new(&scene(HERE, 8, 1, lights.clone()), &asset.info).unwrap();
+    let plan = Plan::new(&frame, &asset.info, None);
+    assert_eq!(plan.dark, 0);
+    let (values, skipped) = lighting.values(&asset.samples, &frame, None, &plan);
+    let (all, front) = (every_value(&asset, &lights), every_value(&asset, &lights[1..]));
+    let depends = all.iter().zip(&front).filter(|(all, front)| front.x > 0.1 * all.x).count();
+    assert!(depends > 50 && skipped > 0.0, "{depends} {skipped}");
+    for (got, expected) in values.iter().zip(&all) {
+        assert!((got.x / expected.x - 1.0).abs() < 1.2e-4 || *got == *expected, "{got} {expected}");
+    }
+}
+
+#[test]
+fn glaring_and_dark_lights_among_many_stay_finite() {
+    let asset = ball(0.2, HERE, Phase::HenyeyGreenstein { g: 0.8 });
+    let mut lights = mostly_dim(300, 1e-5);
+    lights[40] = point(HERE, DVec3::Y * 2.0, 1e30);
+    lights[41] = point(HERE, DVec3::new(0.1, 0.2, 0.0), 1e30);
+    lights[42] = point(HERE, DVec3::Y * 2.0, 0.0);
+    let frame = Frame::new(&scene(HERE, 12, 1, lights), &asset.info).unwrap();
+    let rendered = Player::new(&asset, Backend::Cpu).unwrap().render(&frame, LightMode::Baked).unwrap();
+    let values = rendered.picture.pixels.concat();
+    assert!(values.iter().all(|v| v.is_finite() && *v >= 0.0) && values.iter().any(|v| *v > 1e20));
+    assert!(rendered.lights.dark > 0);
 }

@@ -9,11 +9,12 @@
 //! ψ = exp(-κ/κ̄ · τ̄) with τ̄ decoded from the sample's spherical harmonics and lobe (κ̄ = 0: ψ = 1); bands that a sample
 //! does not have cost nothing. β is the boundary's
 //! Fresnel transmittance from its own coefficients, clamped to 0..1 (index matched: 1). A table of exact depths m
-//! gives ψ = exp(-κ m) and β instead. Lights that do not reach the sample (outside a spot's cone) are skipped; many
-//! directional lights are folded into one vector ([`crate::fold`]).
+//! gives ψ = exp(-κ m) and β instead, a correction on its way is added to ψβ. Lights that do not reach the sample (outside a
+//! spot's cone) or bring next to nothing beside those before them are skipped; many directional lights are folded into
+//! one vector ([`crate::fold`]).
 
-use crate::exact::ExactDepths;
-use crate::fold::{Ambient, LightCounts, Linear, Plan, linear};
+use crate::exact::{ExactDepths, Known};
+use crate::fold::{Ambient, LightCounts, Linear, PORTION, Plan, linear};
 use crate::frame::{Frame, FrameLight, LightKind};
 use diaphane_formats::asset::{Info, Samples};
 use diaphane_formats::encoding::Encoding;
@@ -21,8 +22,10 @@ use diaphane_formats::harmonics::Coefficients;
 use diaphane_formats::phase::henyey_greenstein_f32;
 use diaphane_formats::sh::{self, MAX_ORDER, coefficient_count};
 use glam::{DVec3, Vec3};
+use half::f16;
 use rayon::prelude::*;
 use std::sync::OnceLock;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// What the lighting pass needs of an asset beside the samples themselves.
 #[derive(Clone, Debug)]
@@ -50,7 +53,18 @@ pub struct Lighting {
 struct Prepared<'a> {
     light: &'a FrameLight,
     basis: Option<Vec<f32>>,
-    exact: Option<&'a [[f32; 2]]>,
+    known: Option<&'a Known>,
+    /// Whether its baked light is evaluated here and not folded.
+    baked: bool,
+}
+
+/// The lights that every sample evaluates.
+struct Single<'a> {
+    lights: Vec<Prepared<'a>>,
+    /// How many of them, in front, stand for an environment.
+    environment: usize,
+    /// [`Plan::negligible`].
+    negligible: f32,
 }
 
 impl Lighting {
@@ -83,41 +97,51 @@ impl Lighting {
         self.albedo = DVec3::from(info.albedo).as_vec3();
     }
 
-    /// v of every sample at its centroid, in the samples' order, under the lights of `plan`; parallel over samples.
+    /// v of every sample at its centroid, in the samples' order, under the lights of `plan`; parallel over samples. And the
+    /// share of samples times lights that brought next to nothing and was skipped.
     pub fn values(
         &self,
         samples: &Samples,
         frame: &Frame,
         exact: Option<&ExactDepths>,
         plan: &Plan,
-    ) -> Vec<Vec3> {
-        let lights: Vec<Prepared> = plan
-            .single
-            .iter()
-            .filter_map(|l| frame.lights.get(*l).map(|light| self.prepare(*l, light, samples, exact)))
-            .collect();
+    ) -> (Vec<Vec3>, f32) {
+        let prepare = |l: &usize| {
+            let light = frame.lights.get(*l)?;
+            Some(self.prepare(light, exact.and_then(|e| e.known(*l)), samples, !plan.is_folded(*l)))
+        };
+        let lights: Vec<Prepared> = plan.order.iter().filter_map(prepare).collect();
+        let single = Single { lights, environment: plan.environment, negligible: plan.negligible };
+        let skipped = AtomicU64::new(0);
         let folded = (!plan.folded.is_empty()).then(|| {
             let lights = plan.folded.iter().filter_map(|l| frame.lights.get(*l));
             let linear = self.linear(linear::BANDS);
             (linear, Ambient::new(lights, self.g, frame.view.origin, linear.bands))
         });
         let most = Vec3::splat(frame.most_source());
-        (0..samples.len())
+        let values = (0..samples.len())
             .into_par_iter()
             .with_min_len(256)
             .map(|i| {
-                let mut value = self.source(samples, i, frame, &lights);
+                let (mut value, left_out) = self.source(samples, i, frame, &single);
+                if left_out > 0 {
+                    skipped.fetch_add(left_out, Ordering::Relaxed);
+                }
                 if let Some((linear, ambient)) = &folded {
                     value += self.albedo * from_folded(linear, ambient, i, frame.view.origin, samples);
+                    // Corrections of folded lights may be negative.
+                    value = value.max(Vec3::ZERO);
                 }
                 value.min(most)
             })
-            .collect()
+            .collect();
+        let all = (samples.len() * single.lights.len()).max(1) as f32;
+        (values, skipped.into_inner() as f32 / all)
     }
 
     /// Numbers of a plan.
-    pub fn counts(&self, plan: &Plan) -> LightCounts {
-        plan.counts(self.linear.get().map_or(0.0, |l| l.error))
+    pub fn counts(&self, plan: &Plan, negligible_share: f32) -> LightCounts {
+        plan.counts(self.linear.get().map_or(0.0, |l| l.error), Some(negligible_share))
     }
 
     /// Highest order of any sample.
@@ -142,53 +166,87 @@ impl Lighting {
 
     fn prepare<'a>(
         &self,
-        index: usize,
         light: &'a FrameLight,
+        known: Option<&'a Known>,
         samples: &Samples,
-        exact: Option<&'a ExactDepths>,
+        baked: bool,
     ) -> Prepared<'a> {
-        let table = exact.and_then(|e| e.light(index)).filter(|t| t.len() == samples.len());
+        let fits = |known: &&Known| match known {
+            Known::Exact(depths) => depths.values().len() == samples.len(),
+            Known::Corrected { by, .. } => by.values().len() == samples.len(),
+        };
         let basis = (light.kind == LightKind::Directional).then(|| {
             let mut basis = vec![0.0; coefficient_count(self.order)];
             sh::evaluate_f32(self.order, (-light.direction).to_array(), &mut basis);
             basis
         });
-        Prepared { light, basis, exact: table }
+        Prepared { light, basis, known: known.filter(fits), baked }
     }
 
-    fn source(&self, samples: &Samples, i: usize, frame: &Frame, lights: &[Prepared]) -> Vec3 {
+    /// v of sample `i`, and how many lights were skipped.
+    fn source(&self, samples: &Samples, i: usize, frame: &Frame, single: &Single) -> (Vec3, u64) {
         let place = samples.centroid(i);
         let towards_camera = (frame.view.origin - place).normalize_or_zero();
-        // Only the bands that this sample has.
-        let boundary_order = self.boundary.order.get(i).copied().unwrap_or(0);
-        let order = usize::from(self.depth.order[i].max(boundary_order));
         let mut scratch = [0.0; MAX_ORDER * MAX_ORDER];
         let mut sum = Vec3::ZERO;
-        for prepared in lights {
+        // Lights skipped, and the most that those of this portion can bring.
+        let (mut skipped, mut left_out) = (0, 0.0);
+        for (k, prepared) in single.lights.iter().enumerate() {
+            if k.is_multiple_of(PORTION) {
+                left_out = 0.0;
+            }
             let (to, _, irradiance) = prepared.light.at(place, frame.least_distance);
             if irradiance == Vec3::ZERO {
                 continue;
             }
-            let arriving = match prepared.exact {
-                Some(table) => {
-                    let [length, boundary] = table[i];
-                    (-self.extinction * length).exp() * boundary
+            let g = self.g.clamp(-prepared.light.most_cosine, prepared.light.most_cosine);
+            let phase = henyey_greenstein_f32(g, -to, towards_camera).0;
+            if single.negligible > 0.0 && k >= single.environment && prepared.known.is_none() {
+                let with_this = left_out + irradiance.max_element() * phase;
+                if with_this <= single.negligible * sum.max_element() {
+                    (left_out, skipped) = (with_this, skipped + 1);
+                    continue;
                 }
-                None => {
-                    let basis: &[f32] = match &prepared.basis {
-                        Some(basis) => basis,
-                        None => {
-                            sh::evaluate_f32(order, to.to_array(), &mut scratch);
-                            &scratch
-                        }
+            }
+            let arriving = match prepared.known {
+                Some(Known::Exact(depths)) => self.through(depths.values()[i]),
+                known => {
+                    let baked = match &prepared.basis {
+                        _ if !prepared.baked => Vec3::ZERO,
+                        Some(basis) => self.arriving(i, to, basis),
+                        None => self.arriving_by(i, to, &mut scratch),
                     };
-                    self.arriving(i, to, basis)
+                    match known {
+                        Some(Known::Corrected { by, share }) => {
+                            let [r, g, b, _] = by.values()[i].map(f16::to_f32);
+                            let corrected = baked + *share * Vec3::new(r, g, b);
+                            if prepared.baked { corrected.clamp(Vec3::ZERO, Vec3::ONE) } else { corrected }
+                        }
+                        _ => baked,
+                    }
                 }
             };
-            let g = self.g.clamp(-prepared.light.most_cosine, prepared.light.most_cosine);
-            sum += irradiance * arriving * henyey_greenstein_f32(g, -to, towards_camera).0;
+            sum += irradiance * arriving * phase;
         }
-        sum * self.albedo
+        (sum * self.albedo, skipped)
+    }
+
+    /// ψ β from an exact depth [m, β], per channel, 0..1.
+    pub(crate) fn through(&self, [length, boundary]: [f32; 2]) -> Vec3 {
+        (-self.extinction * length).exp() * boundary
+    }
+
+    /// The baked ψ β of sample `i` in the unit direction `to`, per channel, 0..1.
+    pub(crate) fn arriving_from(&self, i: usize, to: Vec3) -> Vec3 {
+        self.arriving_by(i, to, &mut [0.0; MAX_ORDER * MAX_ORDER])
+    }
+
+    /// The same, with room for the harmonics: only the bands that this sample has are evaluated.
+    fn arriving_by(&self, i: usize, to: Vec3, scratch: &mut [f32; MAX_ORDER * MAX_ORDER]) -> Vec3 {
+        let boundary_order = self.boundary.order.get(i).copied().unwrap_or(0);
+        let order = usize::from(self.depth.order[i].max(boundary_order));
+        sh::evaluate_f32(order, to.to_array(), scratch);
+        self.arriving(i, to, scratch)
     }
 
     /// ψ β of sample `i` in direction `to`, per channel, 0..1.

@@ -9,8 +9,8 @@ pub mod surface;
 pub mod tiles;
 
 use crate::Result;
-use crate::exact::ExactDepths;
-use crate::fold::{LightingKey, Plan};
+use crate::exact::{ExactDepths, ExactReport};
+use crate::fold::{LightCounts, LightingKey, Plan};
 use crate::frame::Frame;
 use crate::placement::covered_squares;
 use crate::rendered::{Counters, RayResult, Rendered};
@@ -50,7 +50,13 @@ pub struct CpuRenderer {
     /// How far one sees into the medium.
     sight: f32,
     /// Sources of the last frame, and what they depend on.
-    lit: Option<(LightingKey, Vec<Source>)>,
+    lit: Option<(LightingKey, Lit)>,
+}
+
+/// Sources of all samples.
+struct Lit {
+    sources: Vec<Source>,
+    lights: LightCounts,
 }
 
 impl CpuRenderer {
@@ -107,9 +113,14 @@ impl CpuRenderer {
 
     /// The source of every sample under the frame's lights, see [`lighting`].
     pub fn sources(&self, frame: &Frame, exact: Option<&ExactDepths>) -> Vec<Source> {
+        self.light(frame, exact).sources
+    }
+
+    fn light(&self, frame: &Frame, exact: Option<&ExactDepths>) -> Lit {
         let plan = Plan::new(frame, &self.info, exact);
-        let values = self.lighting.values(&self.samples, frame, exact, &plan);
-        self.stencil.sources(&values, self.means * frame.share_of_means(exact))
+        let (values, skipped) = self.lighting.values(&self.samples, frame, exact, &plan);
+        let sources = self.stencil.sources(&values, self.means * frame.share_of_means(exact));
+        Lit { sources, lights: self.lighting.counts(&plan, skipped) }
     }
 
     /// Draws a frame.
@@ -118,13 +129,13 @@ impl CpuRenderer {
         let key = LightingKey::new(frame, &self.info, exact);
         let known = self.lit.take().filter(|(known, _)| self.reuse && *known == key);
         let lit_anew = known.is_none();
-        let (key, sources) = known.unwrap_or_else(|| (key, self.sources(frame, exact)));
+        let (key, lit) = known.unwrap_or_else(|| (key, self.light(frame, exact)));
         let lighting_ms = milliseconds(started);
         let started = Instant::now();
         let offsets = subpixel_offsets(frame.samples_per_pixel as usize);
         let kernels = tiles::kernels(&self.cloud, frame.view.origin);
         let shared =
-            Shared { renderer: self, frame, sources: &sources, kernels: &kernels, offsets: &offsets };
+            Shared { renderer: self, frame, sources: &lit.sources, kernels: &kernels, offsets: &offsets };
         let seen = covered_squares(frame, &self.info).map(|[low, high]| Rect { low, high });
         let rects = seen.map_or(Vec::new(), |rect| rect.split(BLOCK));
         let blocks: Vec<Block> =
@@ -159,9 +170,9 @@ impl CpuRenderer {
         if lit_anew {
             passes.insert(0, ("lighting", lighting_ms));
         }
-        let lights = self.lighting.counts(&Plan::new(frame, &self.info, exact));
-        self.lit = Some((key, sources));
-        Rendered { picture, counters, lights, passes }
+        let lights = lit.lights;
+        self.lit = Some((key, lit));
+        Rendered { picture, counters, lights, exact: ExactReport::default(), passes }
     }
 
     /// What one ray of every pixel sees, at `offset` inside the pixel (0..1): rows one after the other.

@@ -9,9 +9,11 @@
 
 pub mod ambient;
 pub mod linear;
+mod reach;
 
 pub use ambient::Ambient;
 pub use linear::Linear;
+pub use reach::{CULL_FROM, NEGLIGIBLE, PORTION, Reach, reach};
 
 use crate::exact::ExactDepths;
 use crate::frame::{Frame, FrameLight, LightKind};
@@ -21,9 +23,6 @@ use serde::Serialize;
 
 /// Directional lights that are evaluated one by one at most.
 pub const MOST_SINGLE: usize = 32;
-
-/// Light that may be left out, as a part of all light at the object.
-const NEGLIGIBLE: f32 = 1e-6;
 
 /// Largest deviation of the direction towards the camera, over (1 - |g|)², for which a phase function is folded.
 const MOST_PARALLAX: f32 = 0.25;
@@ -35,8 +34,15 @@ pub struct Plan {
     pub single: Vec<usize>,
     /// Part of the ambient vector.
     pub folded: Vec<usize>,
+    /// Those of `single` in the order of evaluation: an environment's, then the scene's. Where the samples leave out what brings
+    /// them next to nothing, the brightest come first.
+    pub order: Vec<usize>,
+    /// How many of `order` stand for an environment.
+    pub environment: usize,
     /// Too dim, too far or turned away.
     pub dark: usize,
+    /// What a sample may leave out of each portion of `order`, as a part of what it has by then; 0 where it must take all.
+    pub negligible: f32,
 }
 
 /// What the samples' values depend on beside the material: where nothing of it changes they are not computed again.
@@ -44,7 +50,7 @@ pub struct Plan {
 pub struct LightingKey {
     lights: Vec<FrameLight>,
     scene_lights: usize,
-    exact: Vec<bool>,
+    exact: Option<ExactDepths>,
     least_distance: f32,
     /// Where the camera makes a difference.
     origin: Option<Vec3>,
@@ -53,11 +59,10 @@ pub struct LightingKey {
 impl LightingKey {
     /// Of a frame of an asset.
     pub fn new(frame: &Frame, info: &Info, exact: Option<&ExactDepths>) -> Self {
-        let is_exact = |i: usize| exact.and_then(|e| e.light(i)).is_some();
         Self {
             lights: frame.lights.clone(),
             scene_lights: frame.scene_lights,
-            exact: (0..frame.lights.len()).map(is_exact).collect(),
+            exact: exact.filter(|e| !e.is_empty()).cloned(),
             least_distance: frame.least_distance,
             origin: (info.phase.mean_cosine() != 0.0).then_some(frame.view.origin),
         }
@@ -71,35 +76,59 @@ pub struct LightCounts {
     pub single: usize,
     /// Lights in one vector.
     pub folded: usize,
-    /// Lights that reach nothing, left out.
+    /// Lights that reach nothing, left out for the whole object.
     pub dark: usize,
+    /// Share of the samples times lights evaluated one by one that was left out because it would have brought next to nothing,
+    /// 0..1; `None` on a GPU, which does not count it.
+    pub negligible_share: Option<f32>,
     /// Error of the transmittance that folded lights see, root mean square over samples and directions; 0 where none is
     /// folded.
     pub fold_error: f32,
 }
 
 impl Plan {
-    /// For a frame of an asset, some of whose lights have exact depths.
+    /// For a frame of an asset, some of whose lights have exact depths or are on their way to or from them. A directional light
+    /// on its way may be among those that are folded and among those that are evaluated: there its correction alone.
     pub fn new(frame: &Frame, info: &Info, exact: Option<&ExactDepths>) -> Self {
-        let is_exact = |i: usize| exact.and_then(|e| e.light(i)).is_some();
-        let far = |i: &usize| frame.lights[*i].kind == LightKind::Directional && !is_exact(*i);
-        let (lit, dark) = reaching(frame, 0.5 * info.diagonal());
-        let candidates = lit.iter().copied().filter(far);
-        let folded: Vec<usize> = if !may_fold(frame, info) {
-            Vec::new()
-        } else if lit.iter().filter(|i| **i < frame.scene_lights && far(i)).count() > MOST_SINGLE {
-            candidates.collect()
+        let share = |i: usize| exact.map_or(0.0, |e| e.share(i));
+        let reach = reach(frame, info);
+        let folds = |i: &usize| share(*i) < 1.0 && reach.folds(&frame.lights[*i]);
+        let far = |i: &usize| frame.lights[*i].kind == LightKind::Directional && share(*i) < 1.0;
+        let folded: Vec<usize> = if reach.many {
+            reach.lit.iter().copied().filter(folds).collect()
+        } else if reach.may_fold {
+            reach.lit.iter().copied().filter(|i| *i >= frame.scene_lights && far(i)).collect()
         } else {
-            candidates.filter(|i| *i >= frame.scene_lights).collect()
+            Vec::new()
         };
-        let single = lit.into_iter().filter(|i| folded.binary_search(i).is_err()).collect();
-        Self { single, folded, dark }
+        let mut plan = Self { folded, dark: frame.lights.len() - reach.lit.len(), ..Self::default() };
+        plan.single = reach.lit.iter().copied().filter(|i| !plan.is_folded(*i) || share(*i) > 0.0).collect();
+        plan.arrange(&reach);
+        plan
+    }
+
+    /// Whether a light is part of the ambient vector.
+    pub fn is_folded(&self, light: usize) -> bool {
+        self.folded.binary_search(&light).is_ok()
+    }
+
+    /// Evaluates all lights one by one.
+    pub fn unfold(&mut self, frame: &Frame, info: &Info) {
+        self.single.append(&mut self.folded);
+        self.single.sort_unstable();
+        self.single.dedup();
+        self.arrange(&reach(frame, info));
+    }
+
+    fn arrange(&mut self, reach: &Reach) {
+        (self.order, self.environment, self.negligible) = reach.order(&self.single);
     }
 
     /// What is reported, with the error of what is folded.
-    pub fn counts(&self, fold_error: f32) -> LightCounts {
+    pub fn counts(&self, fold_error: f32, negligible_share: Option<f32>) -> LightCounts {
         let fold_error = if self.folded.is_empty() { 0.0 } else { fold_error };
-        LightCounts { single: self.single.len(), folded: self.folded.len(), dark: self.dark, fold_error }
+        let (single, folded, dark) = (self.single.len(), self.folded.len(), self.dark);
+        LightCounts { single, folded, dark, negligible_share, fold_error }
     }
 }
 
@@ -110,95 +139,7 @@ fn may_fold(frame: &Frame, info: &Info) -> bool {
     g == 0.0 || parallax <= MOST_PARALLAX * (1.0 - g).powi(2)
 }
 
-/// The lights that matter, in order, and the number of others: all those whose irradiance on a sphere of `radius` around
-/// the object adds up to no more than [`NEGLIGIBLE`] of what all others bring at least.
-fn reaching(frame: &Frame, radius: f32) -> (Vec<usize>, usize) {
-    let bounds: Vec<(f32, f32)> =
-        frame.lights.iter().map(|l| irradiance(l, radius, frame.least_distance)).collect();
-    let total: f32 = bounds.iter().map(|(least, _)| least).sum();
-    let mut order: Vec<usize> = (0..bounds.len()).collect();
-    order.sort_by(|a, b| bounds[*a].1.total_cmp(&bounds[*b].1));
-    let mut sum = 0.0;
-    let dark = order
-        .iter()
-        .take_while(|i| {
-            sum += bounds[**i].1;
-            sum <= NEGLIGIBLE * total
-        })
-        .count();
-    let mut lit = order.split_off(dark);
-    lit.sort_unstable();
-    (lit, dark)
-}
-
-/// Least and greatest irradiance of a light on a sphere of `radius` around the origin, the largest channel's.
-fn irradiance(light: &FrameLight, radius: f32, least_distance: f32) -> (f32, f32) {
-    let colour = light.colour.abs().max_element();
-    if light.kind == LightKind::Directional {
-        return (colour, colour);
-    }
-    let distance = light.position.length();
-    let over = |d: f32| colour / d.max(least_distance).powi(2);
-    let (least, greatest) = (over(distance + radius), over(distance - radius));
-    if light.kind == LightKind::Spot {
-        return (0.0, if cone_misses(light, distance, radius) { 0.0 } else { greatest });
-    }
-    (least, greatest)
-}
-
-/// Whether a spot's cone passes the sphere by.
-fn cone_misses(light: &FrameLight, distance: f32, radius: f32) -> bool {
-    if distance <= radius {
-        return false;
-    }
-    let to_centre = -light.position / distance;
-    let off_axis = to_centre.dot(light.direction).clamp(-1.0, 1.0).acos();
-    let sphere = (radius / distance).asin();
-    off_axis - sphere > light.cos_outer.clamp(-1.0, 1.0).acos() + 1e-3
-}
-
 /// Deviation of the direction towards the camera at `place` from that at the origin.
 pub(crate) fn parallax(origin: Vec3, place: Vec3) -> Vec3 {
     (origin - place).normalize_or_zero() - origin.normalize_or_zero()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn light(kind: LightKind, position: Vec3, colour: f32) -> FrameLight {
-        FrameLight {
-            kind,
-            position,
-            direction: -position.normalize_or(Vec3::Y),
-            colour: Vec3::splat(colour),
-            cos_inner: 0.99,
-            cos_outer: 0.98,
-            most_cosine: 1.0,
-        }
-    }
-
-    #[test]
-    fn bounds_hold_on_the_sphere() {
-        for (kind, colour) in [(LightKind::Point, 3.0), (LightKind::Spot, 2.0), (LightKind::Directional, 1.0)]
-        {
-            for distance in [0.5, 1.5, 20.0] {
-                let light = light(kind, Vec3::new(0.3, -0.2, 1.0).normalize() * distance, colour);
-                let (least, greatest) = irradiance(&light, 1.0, 1e-3);
-                for d in diaphane_formats::directions::even_directions(200, 1) {
-                    let (_, _, here) = light.at(d.as_vec3(), 1e-3);
-                    assert!(here.x >= least * 0.999 && here.x <= greatest * 1.001, "{kind:?} {distance}");
-                }
-            }
-        }
-    }
-
-    #[test]
-    fn a_spot_that_looks_away_misses() {
-        let mut spot = light(LightKind::Spot, Vec3::X * 5.0, 1.0);
-        assert!(!cone_misses(&spot, 5.0, 1.0));
-        spot.direction = Vec3::Y;
-        assert!(cone_misses(&spot, 5.0, 1.0));
-        assert!(!cone_misses(&spot, 0.5, 1.0));
-    }
 }

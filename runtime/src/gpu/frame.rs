@@ -2,14 +2,15 @@
 
 use super::asset::AssetBuffers;
 use super::bindings::{Slot, empty_buffer, group, layout};
-use super::uniforms::{LightRecord, ViewUniform};
+use super::uniforms::{LightRecord, TableUse, ViewUniform};
 use crate::cpu::lighting::Lighting;
-use crate::exact::ExactDepths;
+use crate::exact::{ExactDepths, Known};
 use crate::fold::{Ambient, Linear, Plan};
 use crate::frame::Frame;
 use crate::{Error, Result};
 use glam::Vec3;
 use half::f16;
+use std::collections::{HashMap, HashSet};
 use wgpu::{BindGroup, BindGroupLayout, Buffer, BufferBinding, BufferUsages, Device, Queue, ShaderStages};
 
 /// Distance between two rays' uniforms: the largest alignment that an adapter may ask for.
@@ -20,6 +21,8 @@ pub(super) struct FrameBuffers {
     views: Buffer,
     pub lights: Buffer,
     pub exact: Buffer,
+    /// Which table is in which part of it.
+    slots: Vec<Option<u64>>,
     /// Transmittance for folded lights, of the material whose ratio this is.
     pub linear: Buffer,
     known: Option<(Vec3, Linear)>,
@@ -72,6 +75,7 @@ impl FrameBuffers {
             views,
             lights: empty_buffer(device, "lights", 64, BufferUsages::STORAGE | BufferUsages::COPY_DST),
             exact: empty_buffer(device, "exact", 16, BufferUsages::STORAGE | BufferUsages::COPY_DST),
+            slots: Vec::new(),
             linear: empty_buffer(device, "linear", 16, BufferUsages::STORAGE | BufferUsages::COPY_DST),
             known: None,
             ambient: empty_buffer(device, "ambient", 16, BufferUsages::STORAGE | BufferUsages::COPY_DST),
@@ -134,43 +138,96 @@ impl FrameBuffers {
         self.plan = Plan::new(frame, &asset.info, exact);
         self.fold(device, queue, asset, frame);
         // Those that are evaluated first, an environment's in front; then the scene's others, for highlights alone.
-        let is_single = |l: usize| self.plan.single.binary_search(&l).is_ok();
-        let environment = self.plan.single.iter().copied().filter(|l| *l >= frame.scene_lights);
-        let scene = self.plan.single.iter().copied().filter(|l| *l < frame.scene_lights);
-        let others = (0..frame.scene_lights).filter(|l| !is_single(*l));
-        self.first_scene_light = environment.clone().count() as u32;
-        let mut tables: Vec<&[[f32; 2]]> = Vec::new();
-        let mut records = Vec::with_capacity(frame.lights.len());
-        for l in environment.chain(scene).chain(others) {
-            let table = exact.and_then(|e| e.light(l)).filter(|t| t.len() == asset.sample_count as usize);
-            let slot = table.map(|t| {
-                tables.push(t);
-                tables.len() as u32 - 1
-            });
-            records.push(LightRecord::new(&frame.lights[l], slot));
-        }
+        let plan = &self.plan;
+        let others = (0..frame.scene_lights).filter(|l| plan.single.binary_search(l).is_err());
+        let order: Vec<usize> = plan.order.iter().copied().chain(others).collect();
+        self.first_scene_light = plan.environment as u32;
+        let folded: Vec<bool> = order.iter().map(|l| plan.is_folded(*l)).collect();
+        let samples = asset.sample_count as usize;
+        let tables: Vec<Option<Words>> =
+            order.iter().map(|l| Words::of(exact?.known(*l)?, samples)).collect();
         let limits = device.limits();
         let most = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
-        let table_bytes = 8 * u64::from(asset.sample_count);
-        let size = table_bytes * tables.len() as u64;
-        if size > most || (records.len() * size_of::<LightRecord>()) as u64 > most {
+        let size = 8 * (samples * tables.iter().flatten().count()) as u64;
+        let lights = (order.len() * size_of::<LightRecord>()) as u64;
+        if size > most || lights > most {
             return Err(Error::Gpu(format!(
-                "{} lights with exact depths for {} samples do not fit the adapter's buffers ({} MiB)",
-                tables.len(),
-                asset.sample_count,
+                "{} lights with exact depths for {samples} samples do not fit the adapter's buffers ({} MiB)",
+                tables.iter().flatten().count(),
                 most >> 20
             )));
         }
-        self.changed |=
-            grow(device, &mut self.lights, "lights", (records.len() * size_of::<LightRecord>()) as u64);
-        self.changed |= grow(device, &mut self.exact, "exact", size);
+        let slots = self.upload(device, queue, samples, &tables);
+        let record = |((l, slot), (table, folded)): ((&usize, u32), (&Option<Words>, bool))| {
+            let table = table.as_ref().map(|t| TableUse { slot, share: t.share });
+            LightRecord::new(&frame.lights[*l], table, !folded)
+        };
+        let records: Vec<LightRecord> =
+            order.iter().zip(slots).zip(tables.iter().zip(folded)).map(record).collect();
+        self.changed |= grow(device, &mut self.lights, "lights", lights);
         if !records.is_empty() {
             queue.write_buffer(&self.lights, 0, bytemuck::cast_slice(&records));
         }
-        for (k, table) in tables.iter().enumerate() {
-            queue.write_buffer(&self.exact, k as u64 * table_bytes, bytemuck::cast_slice(table));
-        }
         Ok(())
+    }
+
+    /// Sees that all tables are in the buffer, those that are there already where they are. Returns the slot of each, 0 where there
+    /// is none.
+    fn upload(
+        &mut self,
+        device: &Device,
+        queue: &Queue,
+        samples: usize,
+        tables: &[Option<Words>],
+    ) -> Vec<u32> {
+        let wanted: HashSet<u64> = tables.iter().flatten().map(|t| t.id).collect();
+        let needed = 8 * (samples * wanted.len()) as u64;
+        if grow(device, &mut self.exact, "exact", needed) {
+            self.changed = true;
+            self.slots.clear();
+        }
+        let room = (self.exact.size() as usize).checked_div(8 * samples).unwrap_or(0);
+        self.slots.resize(room, None);
+        let (mut known, mut free) = (HashMap::new(), Vec::new());
+        for (slot, table) in self.slots.iter().enumerate() {
+            match table.filter(|id| wanted.contains(id)) {
+                Some(id) => drop(known.insert(id, slot)),
+                None => free.push(slot),
+            }
+        }
+        let mut slots = vec![0; tables.len()];
+        for (place, table) in slots.iter_mut().zip(tables) {
+            let Some(table) = table else { continue };
+            // There are as many slots as tables: where one is not there, one is free.
+            let Some(slot) = known.get(&table.id).copied().or_else(|| free.pop()) else { continue };
+            if known.insert(table.id, slot).is_none() {
+                queue.write_buffer(&self.exact, (8 * samples * slot) as u64, table.bytes);
+                self.slots[slot] = Some(table.id);
+            }
+            *place = slot as u32;
+        }
+        slots
+    }
+}
+
+/// A table as it is uploaded, eight bytes a sample.
+struct Words<'a> {
+    id: u64,
+    bytes: &'a [u8],
+    /// See [`TableUse`].
+    share: f32,
+}
+
+impl<'a> Words<'a> {
+    /// `None` where the table is not for so many samples.
+    fn of(known: &'a Known, samples: usize) -> Option<Self> {
+        let words = match known {
+            Known::Exact(t) => Self { id: t.id(), bytes: bytemuck::cast_slice(t.values()), share: 1.0 },
+            Known::Corrected { by, share } => {
+                Self { id: by.id(), bytes: bytemuck::cast_slice(by.values()), share: *share }
+            }
+        };
+        (words.bytes.len() == 8 * samples).then_some(words)
     }
 }
 
@@ -187,8 +244,7 @@ impl FrameBuffers {
             let limits = device.limits();
             let most = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
             let Some(bands) = Linear::fitting(asset.source.len(), lighting.channels(), most) else {
-                self.plan.single.append(&mut self.plan.folded);
-                self.plan.single.sort_unstable();
+                self.plan.unfold(frame, &asset.info);
                 return;
             };
             let linear =

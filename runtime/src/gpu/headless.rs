@@ -9,7 +9,7 @@ use super::splatting::SplatPath;
 use super::targets::{CENSUS, Targets};
 use super::tiles::Tile;
 use super::timers::{PASSES, Pass, Timers};
-use crate::exact::ExactDepths;
+use crate::exact::{ExactDepths, ExactReport};
 use crate::frame::Frame;
 use crate::placement::covered_squares;
 use crate::rendered::{Counters, MAX_PIECES, RayResult, Rendered};
@@ -144,7 +144,8 @@ impl GpuRenderer {
         if passes.is_empty() {
             passes.push(("frame", started.elapsed().as_secs_f64() * 1e3));
         }
-        Ok(Rendered { picture, counters, lights: self.renderer.light_counts(), passes })
+        let lights = self.renderer.light_counts();
+        Ok(Rendered { picture, counters, lights, exact: ExactReport::default(), passes })
     }
 
     /// What one ray of every pixel sees, at `offset` inside the pixel (0..1), without highlights: rows one after the

@@ -294,6 +294,8 @@ impl Pipeline {
             let diagonal = self.asset.diagonal;
             let lights = LightLayout {
                 single: self.frame.plan.single.len() as u32,
+                environment: self.frame.plan.environment as u32,
+                negligible: self.frame.plan.negligible,
                 first_scene_light: self.frame.first_scene_light,
                 means: self.frame.means,
             };
@@ -308,7 +310,7 @@ impl Pipeline {
 
     /// What became of the lights of the frame that was begun.
     pub(super) fn light_counts(&self) -> LightCounts {
-        self.frame.plan.counts(self.frame.fold_error())
+        self.frame.plan.counts(self.frame.fold_error(), None)
     }
 
     /// The layout of the group that all passes share.

@@ -40,6 +40,9 @@ pub(super) struct ViewUniform {
     pub means: f32,
     pub first_scene_light: u32,
     pub share: f32,
+    pub environment: u32,
+    pub negligible: f32,
+    pub unused: [u32; 2],
 }
 
 /// What a frame's rays need to know about its lights.
@@ -51,6 +54,10 @@ pub(super) struct LightLayout {
     pub first_scene_light: u32,
     /// Share of the lights that baked means serve.
     pub means: f32,
+    /// Records in front that stand for an environment.
+    pub environment: u32,
+    /// What a sample may leave out: [`crate::fold::Plan::negligible`].
+    pub negligible: f32,
 }
 
 impl ViewUniform {
@@ -85,6 +92,9 @@ impl ViewUniform {
             means: lights.means,
             first_scene_light: lights.first_scene_light,
             share: 1.0,
+            environment: lights.environment,
+            negligible: lights.negligible,
+            unused: [0; 2],
         }
     }
 }
@@ -178,12 +188,22 @@ pub(super) struct LightRecord {
     pub cos_outer: f32,
     pub table: u32,
     pub most_cosine: f32,
-    pub unused: [u32; 2],
+    pub share: f32,
+    pub baked: u32,
+}
+
+/// A table that replaces or corrects a light's baked depths.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct TableUse {
+    /// Which one.
+    pub slot: u32,
+    /// 1: exact depths; below: that share of corrections.
+    pub share: f32,
 }
 
 impl LightRecord {
-    /// A light, and its exact depth table if it has one.
-    pub fn new(light: &FrameLight, table: Option<u32>) -> Self {
+    /// A light, the table that it has if any, and whether its baked light is evaluated and not folded.
+    pub fn new(light: &FrameLight, table: Option<TableUse>, baked: bool) -> Self {
         Self {
             position: light.position,
             kind: light.kind as u32,
@@ -191,9 +211,10 @@ impl LightRecord {
             cos_inner: light.cos_inner,
             colour: light.colour,
             cos_outer: light.cos_outer,
-            table: table.unwrap_or(u32::MAX),
+            table: table.map_or(u32::MAX, |t| t.slot),
             most_cosine: light.most_cosine,
-            unused: [0; 2],
+            share: table.map_or(0.0, |t| t.share),
+            baked: u32::from(baked),
         }
     }
 }
@@ -260,7 +281,9 @@ mod tests {
             rays,
             means,
             first_scene_light,
-            share
+            share,
+            environment,
+            negligible
         );
         mirrors!(
             MediumUniform,
@@ -298,7 +321,9 @@ mod tests {
             colour,
             cos_outer,
             table,
-            most_cosine
+            most_cosine,
+            share,
+            baked
         );
     }
 }

@@ -51,5 +51,6 @@ fn fold_lights(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups
             sum += light * vec3f(red[half], green[half], blue[half]);
         }
     }
-    values[place] = vec4f(before.xyz + medium.albedo * max(sum, vec3f(0.0)), before.w);
+    // Corrections of folded lights may be negative.
+    values[place] = vec4f(max(before.xyz + medium.albedo * max(sum, vec3f(0.0)), vec3f(0.0)), before.w);
 }

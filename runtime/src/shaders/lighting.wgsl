@@ -1,13 +1,16 @@
 // Lighting pass: light scattered towards the camera by each sample, one thread a sample.
 //
 //   v = albedo * sum over lights of p(cos) E psi boundary,   psi = exp(-ratio * decode(SH)) or exp(-extinction * m)
+//
+// A correction of psi boundary is on its way to exact depths or back. Baked lights that bring next to nothing beside those
+// before them are skipped: fold/reach.rs states the bound.
 
 @group(1) @binding(0) var<storage, read> centroids: array<vec4f>;   // where values hold, density there
 @group(1) @binding(1) var<storage, read> weights: array<f32>;
 @group(1) @binding(2) var<storage, read> depth: array<u32>;         // codes of the depth's harmonics
 @group(1) @binding(3) var<storage, read> boundary: array<u32>;      // the same of the boundary; only where ior is not 1
 @group(1) @binding(4) var<storage, read> lights: array<Light>;
-@group(1) @binding(5) var<storage, read> exact: array<vec2f>;       // [table][sample]: density length, boundary
+@group(1) @binding(5) var<storage, read> exact: array<vec2u>;       // [table][sample]: density length and boundary, or a correction (f16 x 4)
 @group(1) @binding(6) var<storage, read_write> values: array<vec4f>; // v, weight; between portions: sum, lights so far
 @group(1) @binding(7) var<uniform> recurrence: array<vec4f, 196>;
 @group(1) @binding(8) var<uniform> bands: array<Band, 14>;
@@ -150,6 +153,10 @@ fn transmittance(value: f32) -> vec3f {
     return exp(-medium.ratio * max(1.0 / value - medium.epsilon, 0.0));
 }
 
+fn largest(v: vec3f) -> f32 {
+    return max(v.x, max(v.y, v.z));
+}
+
 @compute @workgroup_size(64)
 fn light_samples(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) groups: vec3u) {
     let sample = id.y * groups.x * 64u + id.x;
@@ -184,25 +191,49 @@ fn light_samples(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgrou
         sum = earlier.xyz;
     }
     let end = min(first + PORTION, view.light_count);
+    // The most that the skipped lights of this portion can bring.
+    var left_out = 0.0;
     // Lights whose depths are looked up, until there are enough of them.
     var waiting = 0u;
     var towards = Towards(vec4f(0.0), vec4f(0.0), vec4f(0.0));
     var brought: array<vec3f, 4>;
+    var corrections: array<vec3f, 4>;
     for (var l = first; l < end; l++) {
         let light = lights[l];
         let arriving = incident(light, x);
-        if (any(arriving.irradiance != vec3f(0.0))) {
-            let g = clamp(medium.mean_cosine, -light.most_cosine, light.most_cosine);
-            let scattered = arriving.irradiance * henyey_greenstein(g, -arriving.towards, towards_camera);
+        let g = clamp(medium.mean_cosine, -light.most_cosine, light.most_cosine);
+        let phase = henyey_greenstein(g, -arriving.towards, towards_camera);
+        let scattered = arriving.irradiance * phase;
+        var skipped = all(arriving.irradiance == vec3f(0.0));
+        if (!skipped && view.negligible > 0.0 && l >= view.environment && light.table == NO_TABLE) {
+            let with_this = left_out + largest(arriving.irradiance) * phase;
+            if (with_this <= view.negligible * largest(sum)) {
+                left_out = with_this;
+                skipped = true;
+            }
+        }
+        if (!skipped) {
+            var correction = vec3f(0.0);
+            var is_exact = false;
             if (light.table != NO_TABLE) {
                 let known = exact[light.table * medium.total + medium.first + sample];
-                sum += scattered * exp(-medium.extinction * known.x) * known.y;
-            } else {
+                is_exact = light.share >= 1.0;
+                if (is_exact) {
+                    let depth = bitcast<vec2f>(known);
+                    sum += scattered * exp(-medium.extinction * depth.x) * depth.y;
+                } else {
+                    correction = light.share * vec3f(unpack2x16float(known.x), unpack2x16float(known.y).x);
+                }
+            }
+            if (!is_exact && light.baked != 0u) {
                 towards.x[waiting] = arriving.towards.x;
                 towards.y[waiting] = arriving.towards.y;
                 towards.z[waiting] = arriving.towards.z;
                 brought[waiting] = scattered;
+                corrections[waiting] = correction;
                 waiting++;
+            } else if (!is_exact) {
+                sum += scattered * correction;
             }
         }
         if (waiting == 4u || (waiting > 0u && l + 1u == end)) {
@@ -213,7 +244,7 @@ fn light_samples(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgrou
                 if (FRESNEL) {
                     psi *= clamp(value.boundary[k], 0.0, 1.0);
                 }
-                sum += brought[k] * psi;
+                sum += brought[k] * clamp(psi + corrections[k], vec3f(0.0), vec3f(1.0));
             }
             waiting = 0u;
         }

@@ -13,6 +13,7 @@ mod shards;
 use diaphane_formats::asset::Asset;
 use diaphane_formats::encoding::Encoding;
 use diaphane_formats::phase::Phase;
+use diaphane_formats::scene::Light;
 use diaphane_runtime::Error;
 use diaphane_runtime::cpu::CpuRenderer;
 use diaphane_runtime::exact::{DepthTracer, ExactDepths};
@@ -142,6 +143,23 @@ fn thousands_of_lights_one_by_one() {
     let frame = Frame::new(&scene, &asset.info).unwrap();
     assert_eq!(Plan::new(&frame, &asset.info, None).single.len(), 4097);
     compare_rays("4,097 lights", &asset, &frame, None);
+}
+
+#[test]
+fn samples_leave_out_the_same_lights() {
+    // Two portions; one light of sixteen is bright, the others bring a few millionths of its light each.
+    let asset = Object { phase: Phase::HenyeyGreenstein { g: 0.5 }, spacing: 0.2, ..ball() }.build();
+    let mut scene = scene(outside());
+    scene.lights = scenes::crowd(400);
+    for light in scene.lights.iter_mut().enumerate().filter(|(k, _)| k % 16 > 0).map(|(_, l)| l) {
+        if let Light::Point { intensity, .. } = light {
+            *intensity *= 2e-6;
+        }
+    }
+    let frame = Frame::new(&scene, &asset.info).unwrap();
+    let lights = CpuRenderer::new(&asset).unwrap().render(&frame, None).lights;
+    assert!(lights.single > 300 && lights.negligible_share.unwrap() > 0.3, "{lights:?}");
+    compare_rays("dim lights", &asset, &frame, None);
 }
 
 #[test]

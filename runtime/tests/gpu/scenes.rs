@@ -41,6 +41,7 @@ pub fn scene(camera: Camera) -> Scene {
         image: ImageSize { width: 112, height: 96, samples_per_pixel: 1 },
         surface: Surface { reflection: false, specular: 0.5, roughness: 0.3 },
         environment: None,
+        exact: Vec::new(),
         lights: vec![
             Light::Point {
                 position: CENTRE + DVec3::new(2.2, 1.2, 1.0),

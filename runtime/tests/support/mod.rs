@@ -156,6 +156,7 @@ pub fn scene(centre: DVec3, side: u32, rays: u32, lights: Vec<Light>) -> Scene {
         surface: Surface { reflection: false, specular: 0.5, roughness: 0.3 },
         environment: None,
         lights,
+        exact: Vec::new(),
     }
 }
 

@@ -57,6 +57,7 @@ impl Row {
             surface: Surface { reflection: false, specular: 0.5, roughness: 0.3 },
             environment: None,
             lights: Vec::new(),
+            exact: Vec::new(),
         };
         self.lights.place(placed, &mut scene);
         scene

@@ -72,6 +72,7 @@ impl Stage {
             surface: Surface { reflection: false, specular: 0.5, roughness: 0.3 },
             environment: None,
             lights: Vec::new(),
+            exact: Vec::new(),
         };
         self.light(lights, &mut scene);
         scene

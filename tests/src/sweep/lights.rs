@@ -40,7 +40,7 @@ pub fn with_lights(scene: &Scene, mesh: &Mesh, count: usize, seed: u64) -> Scene
             Light::Directional { irradiance, .. } => *irradiance *= factor,
         }
     }
-    Scene { lights, environment: None, ..scene.clone() }
+    Scene { lights, exact: Vec::new(), environment: None, ..scene.clone() }
 }
 
 #[cfg(test)]

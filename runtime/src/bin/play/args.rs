@@ -68,7 +68,9 @@ pub struct Args {
     #[arg(long, value_enum, default_value_t = SplatArg::Auto, requires = "output")]
     pub splat: SplatArg,
     /// Depth from the samples to the lights: baked, exact (rays to every light of the scene) or auto (rays to lights
-    /// inside the object's bounding box). Headless default: baked; in the window: auto
+    /// inside the object's bounding box and to those that the scene marks `exact = true`). A picture has all of them at once;
+    /// its default is baked, or auto where a light is marked. In the window, whose default is auto, rays are spread over
+    /// frames, and auto traces all lights that have come to rest
     #[arg(long, value_enum)]
     pub light: Option<LightArg>,
     /// Play with the baked extinction times S, one factor for all channels or one for each (0.6..1.8 is nearly as
@@ -168,7 +170,7 @@ pub enum LightArg {
     Baked,
     /// Rays to every light of the scene
     Exact,
-    /// Rays to lights inside the bounding box
+    /// Rays to lights inside the bounding box, marked exact, or in the window at rest
     Auto,
 }
 

@@ -36,7 +36,9 @@ pub fn run(args: &Args, output: &Path) -> Result<()> {
     };
     let frame = Frame::new(&scene, &asset.info)?;
     let asset = if args.level == Some(LevelArg::Auto) { fine_enough(&asset, &frame)? } else { asset };
-    let mode: LightMode = args.light.map_or(LightMode::Baked, Into::into);
+    let marked = !frame.lights_marked().is_empty();
+    let default = if marked { LightMode::Auto } else { LightMode::Baked };
+    let mode: LightMode = args.light.map_or(default, Into::into);
     warn(&frame, &asset.info, mode);
     let mut player = Player::with_path(&asset, args.backend.into(), args.splat.into())?;
     tell(&mut player);

@@ -2,6 +2,7 @@
 
 use anyhow::Result;
 use diaphane_formats::files;
+use diaphane_runtime::exact::ExactReport;
 use diaphane_runtime::fold::LightCounts;
 use diaphane_runtime::frame::Frame;
 use diaphane_runtime::gpu::SplatPath;
@@ -33,6 +34,8 @@ pub struct Stats {
     lights: usize,
     /// What became of them in the last frame.
     light_counts: LightCounts,
+    /// Exact depths in the last frame: lights, cost, and the error that the baked ones have.
+    exact: ExactReport,
     /// Lights of the scene's list.
     scene_lights: usize,
     frames: u32,
@@ -85,6 +88,7 @@ impl Stats {
             albedo: player.info().albedo,
             lights: frame.lights.len(),
             light_counts: LightCounts::default(),
+            exact: ExactReport::default(),
             scene_lights: frame.scene_lights,
             frames,
             splats_per_pixel: 0.0,
@@ -104,6 +108,7 @@ impl Stats {
         }
         self.counters = rendered.counters;
         self.light_counts = rendered.lights;
+        self.exact = rendered.exact.clone();
         self.samples_drawn = rendered.counters.samples_drawn;
         self.splats_per_pixel = rendered.counters.splats_per_ray();
     }

@@ -7,12 +7,9 @@ use super::super::shaders;
 use super::super::shard::Shard;
 use super::super::timers::Pass;
 use super::Recorder;
+use crate::fold::PORTION;
 use diaphane_formats::harmonics;
 use wgpu::{BindGroup, BindGroupLayout, ComputePipeline, Device, ShaderStages};
-
-/// Most lights of a dispatch. Mesa's software adapter (22.3.6) ends the loops of a thread after 65,535 rounds altogether: a
-/// light of fourteen bands takes up to 130.
-const PORTION: u32 = 256;
 
 /// See lighting.wgsl.
 #[derive(Clone)]
@@ -30,7 +27,7 @@ impl Lighting {
         let module = shaders::module(device, "lighting", shaders::LIGHTING);
         let constants = [
             ("FRESNEL", f64::from(u8::from(asset.fresnel))),
-            ("PORTION", f64::from(PORTION)),
+            ("PORTION", PORTION as f64),
             ("BOUNDARY_ORDER", asset.boundary_order as f64),
             ("BOUNDARY_BYTES", harmonics::bytes(asset.boundary_order) as f64),
         ];
@@ -62,10 +59,10 @@ impl Lighting {
 
     /// For so many lights.
     pub fn record(&self, r: &mut Recorder, groups: &[BindGroup], asset: &AssetBuffers, lights: usize) {
-        let portions = (lights as u32).div_ceil(PORTION).max(1);
+        let portions = lights.div_ceil(PORTION).max(1);
         if portions > 1 {
             r.encoder.clear_buffer(&asset.values, 0, None);
         }
-        r.over_samples(Pass::Lighting, &self.pipeline, groups, &asset.shards, portions);
+        r.over_samples(Pass::Lighting, &self.pipeline, groups, &asset.shards, portions as u32);
     }
 }

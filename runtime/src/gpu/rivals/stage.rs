@@ -146,7 +146,7 @@ impl Stage {
         if bytes > most || (size_of::<LightRecord>() * frame.lights.len()) as u64 > most {
             return Err(Error::Rival("picture or lights are too large for the rivals".to_owned()));
         }
-        let lights = frame.lights.iter().map(|l| LightRecord::new(l, None));
+        let lights = frame.lights.iter().map(|l| LightRecord::new(l, None, true));
         let lights: Vec<LightRecord> = lights.chain([LightRecord::zeroed()]).collect();
         let lights = filled_buffer(device, "lights", &lights, BufferUsages::STORAGE);
         let radiance =
@@ -199,7 +199,13 @@ impl Stage {
     /// The group that all passes share.
     fn view(&self, device: &Device, frame: &Frame) -> BindGroup {
         let tile = Tile { start: [0; 2], size: [frame.width, frame.height] };
-        let lights = LightLayout { single: frame.lights.len() as u32, first_scene_light: 0, means: 1.0 };
+        let lights = LightLayout {
+            single: frame.lights.len() as u32,
+            first_scene_light: 0,
+            means: 1.0,
+            environment: 0,
+            negligible: 0.0,
+        };
         let view = ViewUniform::new(frame, self.diagonal, tile, [0.5; 2], 1, lights);
         let view = filled_buffer(device, "view", &[view], BufferUsages::UNIFORM);
         let resources = vec![view.as_entire_binding(), self.medium.as_entire_binding()];

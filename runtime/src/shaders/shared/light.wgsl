@@ -6,8 +6,10 @@ struct Light {
     cos_inner: f32,
     colour: vec3f,
     cos_outer: f32,
-    table: u32,             // which exact depth table replaces the spherical harmonics; NO_TABLE: none
+    table: u32,             // which table replaces or corrects the spherical harmonics; NO_TABLE: none
     most_cosine: f32,       // limit of the phase function's mean cosine, up and down
+    share: f32,             // 1: the table holds exact depths; below 1: corrections, of which so much is added
+    baked: u32,             // 0: the baked light is folded and only the correction counts
 }
 
 const NO_TABLE: u32 = 0xffffffffu;

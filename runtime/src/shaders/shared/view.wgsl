@@ -20,6 +20,8 @@ struct View {
     means: f32,             // share of the lights whose values are means over a sample's cell
     first_scene_light: u32, // of those that make highlights
     share: f32,             // of a level of detail in an object that fades into the next; below 0: more of it follows
+    environment: u32,       // lights in front that stand for an environment
+    negligible: f32,        // what a sample may leave out of a portion of lights, as a part of what it has; 0: nothing
 }
 
 @group(0) @binding(0) var<uniform> view: View;

@@ -43,9 +43,12 @@ impl App {
                 view.changed = Instant::now();
             }
             if view.shown.as_ref().is_none_or(|s| s.edit != edit) {
-                view.screen.set_material(&edit.apply(&self.session.asset.info)?);
+                view.screen.set_material(&self.session.set_material()?);
             }
-            let exact = self.session.trace(&frame);
+        }
+        let exact = self.session.advance(&frame, view.frame_ms);
+        // Light that goes from baked to exact depths is drawn anew, but nothing moves.
+        if !same || view.shown.as_ref().is_some_and(|s| s.exact != exact) {
             view.shown = Some(Shown { frame, mode, edit, exact, rays: 0 });
         }
         let Some(shown) = &mut view.shown else {
@@ -104,7 +107,12 @@ impl App {
         self.due = None;
         if let Some(again) = again.filter(|again| !again.is_zero()) {
             self.due = Some(Instant::now() + again);
-        } else if self.errand.is_some() || again.is_some() || unfinished || delay.is_zero() {
+        } else if self.errand.is_some()
+            || again.is_some()
+            || unfinished
+            || delay.is_zero()
+            || self.session.is_busy()
+        {
             view.screen.window.request_redraw();
         } else {
             let settle =
@@ -123,6 +131,7 @@ impl App {
         let mut exposure = self.exposure.unwrap_or(1.0);
         let mut free = egui::Rect::ZERO;
         let shown = view.shown.as_ref();
+        let exact = self.session.exact_report().clone();
         let output = context.run_ui(input, |ui| {
             egui::Panel::right("panel").exact_size(panel::WIDTH).resizable(false).show(ui, |ui| {
                 let mut contents = Contents {
@@ -143,6 +152,7 @@ impl App {
                         rays_wanted: RAYS,
                         samples: self.session.asset.info.samples,
                         statistics: &view.statistics,
+                        exact: &exact,
                     },
                     message: &self.message,
                 };

@@ -2,6 +2,7 @@
 
 use diaphane_formats::scene::{Light, Scene};
 use diaphane_runtime::edit::Edit;
+use diaphane_runtime::exact::ExactReport;
 use diaphane_runtime::gpu::Statistics;
 use diaphane_runtime::player::LightMode;
 use egui::{CollapsingHeader, DragValue, Grid, RichText, Slider, SliderClamping, Ui};
@@ -40,6 +41,8 @@ pub struct Numbers<'a> {
     pub rays_wanted: u32,
     pub samples: u64,
     pub statistics: &'a Statistics,
+    /// Of the last frame.
+    pub exact: &'a ExactReport,
 }
 
 /// Buttons.
@@ -88,6 +91,7 @@ fn statistics(ui: &mut Ui, numbers: &Numbers) {
             row("pieces not drawn", counters.pieces_dropped.to_string());
         }
     });
+    exact_depths(ui, numbers.exact);
     CollapsingHeader::new("Passes, ms").default_open(true).show(ui, |ui| {
         if numbers.statistics.passes.is_empty() {
             ui.label("this adapter has no clock");
@@ -97,6 +101,30 @@ fn statistics(ui: &mut Ui, numbers: &Numbers) {
                 ui.label(*name);
                 ui.monospace(format!("{ms:8.2}"));
                 ui.end_row();
+            }
+        });
+    });
+}
+
+/// How many lights have exact depths, what that costs, and what error the baked ones have.
+fn exact_depths(ui: &mut Ui, report: &ExactReport) {
+    CollapsingHeader::new("Exact light").default_open(false).show(ui, |ui| {
+        Grid::new("exact").num_columns(2).show(ui, |ui| {
+            let mut row = |name: &str, value: String| {
+                ui.label(name);
+                ui.monospace(value);
+                ui.end_row();
+            };
+            row("exact", report.exact.to_string());
+            row("fading, in progress", format!("{}, {}", report.fading, report.waiting));
+            row("baked", report.baked.to_string());
+            if report.crowded > 0 {
+                row("no memory for", report.crowded.to_string());
+            }
+            row("ms, memory", format!("{:.2}, {} MiB", report.milliseconds, report.bytes >> 20));
+            for error in &report.errors {
+                let name = format!("baked error, light {}", error.light + 1);
+                row(&name, format!("{:.2} %", 100.0 * error.relative));
             }
         });
     });
@@ -182,18 +210,29 @@ fn material(ui: &mut Ui, edit: &mut Edit, baked_albedo: DVec3) {
 
 fn lights(ui: &mut Ui, contents: &mut Contents) {
     let speed = 0.005 * contents.diagonal;
-    let mut gone = None;
+    let (mut gone, mut marked) = (None, None);
+    let marks = contents.scene.exact.clone();
     for (i, light) in contents.scene.lights.iter_mut().enumerate() {
         let title = format!("Light {}: {}", i + 1, kind(light));
         CollapsingHeader::new(title).id_salt(("light", i)).default_open(i == 0).show(ui, |ui| {
             edit(ui, light, speed);
-            if ui.button("remove").clicked() {
-                gone = Some(i);
-            }
+            ui.horizontal(|ui| {
+                let mut exact = marks.get(i).copied().unwrap_or(false);
+                let hint = "Its depths are computed before those of others";
+                if ui.checkbox(&mut exact, "exact").on_hover_text(hint).changed() {
+                    marked = Some((i, exact));
+                }
+                if ui.button("remove").clicked() {
+                    gone = Some(i);
+                }
+            });
         });
     }
+    if let Some((i, exact)) = marked {
+        contents.scene.mark_exact(i, exact);
+    }
     if let Some(i) = gone {
-        contents.scene.lights.remove(i);
+        contents.scene.remove_light(i);
     }
     if contents.scene.environment.is_some() {
         ui.label("and the scene's environment");

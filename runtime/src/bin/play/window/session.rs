@@ -2,15 +2,19 @@
 
 use super::orbit::Orbit;
 use anyhow::Result;
-use diaphane_formats::asset::Asset;
+use diaphane_formats::asset::{Asset, Info};
 use diaphane_formats::scene::{Camera, Scene};
 use diaphane_runtime::edit::Edit;
-use diaphane_runtime::exact::{DepthTracer, ExactDepths};
+use diaphane_runtime::exact::{ExactDepths, ExactReport, Settings, Spread};
 use diaphane_runtime::frame::{Frame, FrameLight};
 use diaphane_runtime::player::LightMode;
 
 /// Rays of each pixel that a picture at rest gets.
 pub const RAYS: u32 = 16;
+
+/// Part of a frame's time that exact depths may take, where that is more than their milliseconds: on adapters that are slow a few
+/// milliseconds do not show.
+const SHARE: f64 = 0.1;
 
 /// An asset, its scene, and what the user made of it.
 pub struct Session {
@@ -26,7 +30,8 @@ pub struct Session {
     camera: Camera,
     /// Lights that stand for the environment, projected once.
     environment: Vec<FrameLight>,
-    tracer: DepthTracer,
+    /// Exact depths, a part in each frame.
+    spread: Spread,
 }
 
 impl Session {
@@ -40,7 +45,7 @@ impl Session {
         let orbit = Orbit::new(&scene.camera, f64::from(asset.info.diagonal()));
         Ok(Self {
             environment: all.lights[all.scene_lights..].to_vec(),
-            tracer: DepthTracer::new(&asset)?,
+            spread: Spread::new(&asset, Settings::DEFAULT)?,
             first_orbit: orbit,
             camera: scene.camera,
             asset,
@@ -97,13 +102,30 @@ impl Session {
         Ok(frame)
     }
 
-    /// Exact depths of the lights that the mode wants them for.
-    pub fn trace(&mut self, frame: &Frame) -> Option<ExactDepths> {
-        let wanted = match self.mode {
-            LightMode::Baked => Vec::new(),
-            LightMode::Exact => (0..frame.scene_lights).collect(),
-            LightMode::Auto => frame.lights_inside(&self.asset.info),
-        };
-        (!wanted.is_empty()).then(|| self.tracer.trace(frame, &wanted))
+    /// What the next frame knows of its lights beyond the baked depths. The frame before took `milliseconds`.
+    pub fn advance(&mut self, frame: &Frame, milliseconds: f64) -> Option<ExactDepths> {
+        self.spread.set_milliseconds(Settings::DEFAULT.milliseconds.max(SHARE * milliseconds));
+        let exact = self.spread.advance(frame, self.mode);
+        (!exact.is_empty()).then_some(exact)
+    }
+
+    /// Takes over the material.
+    ///
+    /// # Errors
+    /// Values out of range.
+    pub fn set_material(&mut self) -> Result<Info> {
+        let info = self.edit.apply(&self.asset.info)?;
+        self.spread.set_material(&info);
+        Ok(info)
+    }
+
+    /// Whether exact depths are on their way.
+    pub fn is_busy(&self) -> bool {
+        self.spread.is_busy()
+    }
+
+    /// What became of exact depths in the last frame.
+    pub fn exact_report(&self) -> &ExactReport {
+        self.spread.report()
     }
 }

@@ -1,0 +1,194 @@
+//! Rays from the samples to lights, and how the baked transmittance differs from theirs.
+
+use super::report::{LightError, Squares};
+use super::schedule::{Place, Portion, Work, place};
+use super::{Depths, ExactDepths, ExactReport, Known};
+use crate::Result;
+use crate::cpu::lighting::Lighting;
+use crate::frame::{Frame, FrameLight};
+use diaphane_formats::asset::{Asset, Info, Samples};
+use diaphane_formats::medium::Medium;
+use diaphane_formats::mesh::Mesh;
+use diaphane_formats::visibility::{Accel, depth_along};
+use glam::{DVec3, Vec3};
+use half::f16;
+use rayon::prelude::*;
+use std::ops::Range;
+use std::sync::{Arc, OnceLock};
+use std::time::Instant;
+
+/// Every so manieth sample tells the error where a light is traced at once.
+const CHECKED: usize = 16;
+
+/// Samples of a task.
+const TASK: usize = 64;
+
+/// Traces depths from an asset's samples, and remembers those of lights that stay where they are.
+pub struct DepthTracer {
+    mesh: Mesh,
+    medium: Medium,
+    samples: Samples,
+    places: Vec<Vec3>,
+    accel: OnceLock<Accel>,
+    /// As it is played.
+    info: Info,
+    /// Baked light, to compare with.
+    lighting: OnceLock<Lighting>,
+    traced: Vec<Traced>,
+    report: ExactReport,
+}
+
+/// A light of the call before.
+struct Traced {
+    place: Place,
+    depths: Arc<Depths>,
+    error: f32,
+}
+
+impl DepthTracer {
+    /// A tracer for an asset. Cheap: the hierarchy is built when first needed.
+    ///
+    /// # Errors
+    /// An asset whose mesh or medium makes no sense.
+    pub fn new(asset: &Asset) -> Result<Self> {
+        Ok(Self {
+            mesh: asset.mesh()?,
+            medium: asset.medium()?,
+            places: (0..asset.samples.len()).map(|i| asset.samples.centroid(i)).collect(),
+            samples: asset.samples.clone(),
+            accel: OnceLock::new(),
+            info: asset.info.clone(),
+            lighting: OnceLock::new(),
+            traced: Vec::new(),
+            report: ExactReport::default(),
+        })
+    }
+
+    /// Takes extinction from an edited asset's parameters: it decides how baked and exact transmittance differ. Depths stay as
+    /// they are.
+    pub fn set_material(&mut self, info: &Info) {
+        self.info = info.clone();
+        if let Some(lighting) = self.lighting.get_mut() {
+            lighting.set_material(info);
+        }
+    }
+
+    /// Builds what the first light would have to wait for.
+    pub fn prepare(&self) {
+        self.accel();
+        self.lighting();
+    }
+
+    /// Depths towards the lights of `frame` named by `wanted` (indices; those out of range are ignored). Lights that
+    /// were traced in the call before are not traced again.
+    pub fn trace(&mut self, frame: &Frame, wanted: &[usize]) -> ExactDepths {
+        let started = Instant::now();
+        let mut lights = vec![None; frame.lights.len()];
+        let mut kept: Vec<Traced> = Vec::with_capacity(wanted.len());
+        let mut report = ExactReport::default();
+        for &index in wanted.iter().filter(|&&i| i < frame.lights.len()) {
+            let light = &frame.lights[index];
+            let place = place(light);
+            let known = kept.iter().chain(&self.traced).find(|t| t.place == place);
+            let (depths, error) = known.map(|t| (Arc::clone(&t.depths), t.error)).unwrap_or_else(|| {
+                let depths = self.depths(light, frame.least_distance, 0..self.places.len());
+                report.rays += depths.len() as u64;
+                let error = self.error(light, frame.least_distance, &depths);
+                (Arc::new(Depths::new(depths)), error)
+            });
+            report.errors.push(LightError { light: index, relative: error });
+            lights[index] = Some(Known::Exact(Arc::clone(&depths)));
+            kept.push(Traced { place, depths, error });
+        }
+        report.milliseconds = started.elapsed().as_secs_f64() * 1e3;
+        report.exact = lights.iter().flatten().count();
+        report.baked = lights.len() - report.exact;
+        report.bytes = (report.exact * self.places.len() * size_of::<[f32; 2]>()) as u64;
+        report.rays_per_second = report.rays as f64 * 1e3 / report.milliseconds.max(1e-3);
+        self.report = report;
+        self.traced = kept;
+        ExactDepths::new(lights)
+    }
+
+    /// What the last call of [`Self::trace`] did.
+    pub fn report(&self) -> &ExactReport {
+        &self.report
+    }
+
+    /// Forgets what was traced, so that the next call does all the work again.
+    pub fn forget(&mut self) {
+        self.traced.clear();
+    }
+
+    fn accel(&self) -> &Accel {
+        self.accel.get_or_init(|| Accel::new(&self.mesh))
+    }
+
+    fn lighting(&self) -> &Lighting {
+        self.lighting.get_or_init(|| Lighting::new(&self.info, &self.samples))
+    }
+
+    fn depths(&self, light: &FrameLight, least: f32, range: Range<usize>) -> Vec<[f32; 2]> {
+        let accel = self.accel();
+        let trace = |scratch: &mut Vec<_>, x: &Vec3| {
+            let (to, distance, _) = light.at(*x, least);
+            let (to, limit) = (to.as_dvec3().normalize_or_zero(), f64::from(distance));
+            if to == DVec3::ZERO {
+                return [0.0, 1.0];
+            }
+            let depth = depth_along(accel, &self.medium, x.as_dvec3(), to, limit, scratch);
+            [depth.density_length as f32, depth.boundary as f32]
+        };
+        self.places[range].par_iter().with_min_len(TASK).map_init(Vec::new, trace).collect()
+    }
+
+    /// d of sample `i` for its exact depth, and what it adds to the error's sums.
+    fn difference(&self, light: &FrameLight, least: f32, i: usize, depth: [f32; 2]) -> (Vec3, Squares) {
+        let lighting = self.lighting();
+        let (to, _, irradiance) = light.at(self.places[i], least);
+        let exact = lighting.through(depth);
+        let d = exact - lighting.arriving_from(i, to);
+        let weight = f64::from(self.samples.weight[i].max(0.0));
+        let square = |v: Vec3| weight * (irradiance.as_dvec3() * v.as_dvec3()).length_squared();
+        (d, Squares { difference: square(d), exact: square(exact) })
+    }
+
+    /// Error of the baked depths, from a part of the samples.
+    fn error(&self, light: &FrameLight, least: f32, depths: &[[f32; 2]]) -> f32 {
+        let of = |k: usize| self.difference(light, least, k * CHECKED, depths[k * CHECKED]).1;
+        let squares: Vec<Squares> =
+            (0..depths.len().div_ceil(CHECKED)).into_par_iter().with_min_len(TASK).map(of).collect();
+        squares.into_iter().fold(Squares::default(), Squares::plus).relative()
+    }
+}
+
+impl Work for (&DepthTracer, f32) {
+    fn samples(&self) -> usize {
+        self.0.places.len()
+    }
+
+    fn run(&mut self, light: &FrameLight, range: Range<usize>) -> (Portion, f64) {
+        let started = Instant::now();
+        let depths = self.0.depths(light, self.1, range.clone());
+        let (corrections, squares) = self.compare(light, range, &depths);
+        (Portion { depths, corrections, squares }, started.elapsed().as_secs_f64() * 1e3)
+    }
+
+    fn compare(
+        &mut self,
+        light: &FrameLight,
+        range: Range<usize>,
+        depths: &[[f32; 2]],
+    ) -> (Vec<[f16; 4]>, Squares) {
+        let (tracer, least) = *self;
+        let of = |(i, depth): (usize, &[f32; 2])| {
+            let (d, squares) = tracer.difference(light, least, i, *depth);
+            ([d.x, d.y, d.z, 0.0].map(f16::from_f32), squares)
+        };
+        let each: Vec<([f16; 4], Squares)> =
+            range.into_par_iter().zip(depths).with_min_len(TASK).map(of).collect();
+        // One after the other, so that the sum does not depend on the number of threads.
+        let squares = each.iter().fold(Squares::default(), |sum, (_, s)| sum.plus(*s));
+        (each.into_iter().map(|(d, _)| d).collect(), squares)
+    }
+}
