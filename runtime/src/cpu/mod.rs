@@ -158,7 +158,8 @@ impl CpuRenderer {
         for (cells, offset) in cells.iter().zip(&offsets) {
             let samples = shown::count(&self.cloud, frame, *offset, cells, self.sight);
             let (tiles, pieces) = cells.tiles();
-            counters.census.add(1, [frame.width, frame.height], samples, tiles, pieces);
+            let size = seen.map_or([0; 2], |rect| [0, 1].map(|c| rect.high[c] - rect.low[c]));
+            counters.census.add(1, size, samples, tiles, pieces);
         }
         picture.coverage = Some(coverage);
         let rays = (picture.pixels.len() * offsets.len()) as u64;
