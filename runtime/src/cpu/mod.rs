@@ -158,7 +158,8 @@ impl CpuRenderer {
         for (cells, offset) in cells.iter().zip(&offsets) {
             let samples = shown::count(&self.cloud, frame, *offset, cells, self.sight);
             let (tiles, pieces) = cells.tiles();
-            let size = seen.map_or([0; 2], |rect| [0, 1].map(|c| rect.high[c] - rect.low[c]));
+            // Out of sight the GPU looks at one pixel.
+            let size = seen.map_or([1; 2], |rect| [0, 1].map(|c| rect.high[c] - rect.low[c]));
             counters.census.add(1, size, samples, tiles, pieces);
         }
         picture.coverage = Some(coverage);
