@@ -9,6 +9,10 @@
 //! Objects attenuate what lies behind them, the host's colours and each other, and cast no shadows on each other. They are
 //! ordered by the distance of their centres; where two run through each other the nearer one counts as in front altogether.
 
+mod interface;
+
+pub use interface::{HostDepth, HostFrame, HostReport, Options};
+
 use super::bindings::empty_buffer;
 use super::faults::allocate;
 use super::frame::common_layout;
@@ -22,38 +26,14 @@ use super::tiles::{Tile, split};
 use super::timers::Timers;
 use crate::detail::{Choice, Detail, Fineness, details, pixels_at_nearest};
 use crate::edit::Edit;
-use crate::frame::{Frame, FrameLight};
-use crate::placement::{HostCamera, Placement, covered};
+use crate::frame::Frame;
+use crate::placement::{Placement, covered};
 use crate::{Error, Result};
 use diaphane_formats::asset::{Asset, Info};
-use diaphane_formats::scene::{Light, Surface};
-use glam::Mat4;
 use wgpu::{
     BindGroup, Buffer, BufferUsages, Color, CommandEncoder, Device, Features, LoadOp, Operations, Queue,
-    RenderPass, RenderPassColorAttachment, RenderPassDescriptor, StoreOp, TextureFormat, TextureView,
+    RenderPass, RenderPassColorAttachment, RenderPassDescriptor, StoreOp, TextureView,
 };
-
-/// The targets of a host's render pass.
-#[derive(Clone, Copy, Debug)]
-pub struct Options {
-    /// Of the colour attachment; radiance times exposure is written as it is, so a format of floats keeps it all.
-    pub colour: TextureFormat,
-    /// Of the depth attachment, if the pass has one; it is neither read nor written there.
-    pub depth: Option<TextureFormat>,
-    /// Samples of both.
-    pub sample_count: u32,
-    /// How kernels are summed; `None`: whichever suits the device.
-    pub path: Option<SplatPath>,
-    /// Which levels of detail are fine enough.
-    pub fineness: Fineness,
-}
-
-impl Options {
-    /// A colour attachment alone, one sample.
-    pub fn new(colour: TextureFormat) -> Self {
-        Self { colour, depth: None, sample_count: 1, path: None, fineness: Fineness::DEFAULT }
-    }
-}
 
 /// An asset of a [`Renderer`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -62,54 +42,6 @@ pub struct AssetId(usize);
 /// An object of a [`Renderer`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct InstanceId(usize);
-
-/// A host's depth buffer: a texture view with the aspect depth, one sample, of the picture's size, that can be bound; and the
-/// projection that it was drawn with.
-#[derive(Clone, Copy, Debug)]
-pub struct HostDepth<'a> {
-    /// What shaders may read.
-    pub view: &'a TextureView,
-    /// From the eye to clip space.
-    pub projection: Mat4,
-}
-
-/// One frame of a host.
-#[derive(Clone, Copy, Debug)]
-pub struct HostFrame<'a> {
-    /// Columns and rows.
-    pub size: [u32; 2],
-    /// Where it is seen from.
-    pub camera: HostCamera,
-    /// Lights in the world.
-    pub lights: &'a [Light],
-    /// An environment as [`crate::frame::environment_lights`] makes it.
-    pub environment: &'a [FrameLight],
-    /// How surfaces reflect lights.
-    pub surface: Surface,
-    /// What hides objects.
-    pub depth: Option<HostDepth<'a>>,
-    /// Factor on the radiance.
-    pub exposure: f32,
-}
-
-/// What a frame took.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct HostReport {
-    /// Objects drawn.
-    pub drawn: usize,
-    /// Objects out of sight.
-    pub culled: usize,
-    /// Objects whose samples were lit anew.
-    pub lit: usize,
-    /// Tiles of all objects.
-    pub tiles: usize,
-    /// Of these, the ones between two levels of detail, which are drawn with both.
-    pub fading: usize,
-    /// Samples of the levels that were drawn.
-    pub samples: u64,
-    /// Whether the last picture still holds, so that nothing was recorded.
-    pub reused: bool,
-}
 
 struct Instance {
     asset: usize,

@@ -101,14 +101,17 @@ pub fn with_slivers(mut t: Triangles, step: usize) -> Triangles {
     t
 }
 
+/// Adds a vertex half way between two. Coordinates of a box's edges are such that it is on their line exactly.
+fn add_middle(t: &mut Triangles, a: u32, b: u32) -> u32 {
+    t.positions.push(0.5 * (t.positions[a as usize] + t.positions[b as usize]));
+    t.positions.len() as u32 - 1
+}
+
 /// A face without area between three points of the first edge of every `step`th face.
 pub fn with_flat_faces(mut t: Triangles, step: usize) -> Triangles {
     for i in (0..t.triangles.len()).step_by(step) {
         let [a, b, _] = t.triangles[i];
-        // Coordinates of a box's edges are such that the middle of two vertices is on their line exactly.
-        let middle = 0.5 * (t.positions[a as usize] + t.positions[b as usize]);
-        t.positions.push(middle);
-        let m = t.positions.len() as u32 - 1;
+        let m = add_middle(&mut t, a, b);
         t.triangles.push([a, m, b]);
     }
     t
@@ -118,9 +121,7 @@ pub fn with_flat_faces(mut t: Triangles, step: usize) -> Triangles {
 pub fn with_split_edges(mut t: Triangles, step: usize) -> Triangles {
     for i in (0..t.triangles.len()).step_by(step) {
         let [a, b, c] = t.triangles[i];
-        let middle = 0.5 * (t.positions[a as usize] + t.positions[b as usize]);
-        t.positions.push(middle);
-        let m = t.positions.len() as u32 - 1;
+        let m = add_middle(&mut t, a, b);
         t.triangles[i] = [a, m, c];
         t.triangles.push([m, b, c]);
     }
