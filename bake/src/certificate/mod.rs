@@ -53,8 +53,8 @@ pub(crate) struct Measured {
     played: Vec<Vec<f32>>,
     /// Under the exact lights.
     with_exact_light: Vec<Vec<f32>>,
-    /// Of each coarser level under the same lights, which it stores.
-    coarser: Vec<Vec<Vec<f32>>>,
+    /// Of each coarser level under the same lights, which it stores: one level after the other.
+    coarser: Vec<Vec<f32>>,
 }
 
 /// Plays `packed` with views, rays and lights drawn from `seed`; `exact` holds for each of [`exact_lights`] what arrives
@@ -85,7 +85,7 @@ pub(crate) fn measure(
         let stored = Stored::new(&level, &few);
         Player::new(&level, &views).radiance(EXACT.len(), |i, l| stored.arriving(i, l, l % 3), means, stage)
     });
-    let coarser = coarser.collect::<Result<_>>()?;
+    let coarser = coarser.collect::<Result<Vec<_>>>()?.concat();
     Ok(Measured {
         seed,
         views: views.iter().map(|v| (v.direction, v.rays.len())).collect(),
@@ -109,13 +109,8 @@ impl Measured {
             && self.truth.iter().all(truth)
             && self.played.len() == LIGHTS
             && self.with_exact_light.len() == EXACT.len()
-            && self.coarser.iter().all(|level| level.len() == EXACT.len())
-            && self
-                .played
-                .iter()
-                .chain(&self.with_exact_light)
-                .chain(self.coarser.iter().flatten())
-                .all(whole)
+            && self.coarser.len().is_multiple_of(EXACT.len())
+            && self.played.iter().chain(&self.with_exact_light).chain(&self.coarser).all(whole)
     }
 
     /// The certificate for the albedo and phase function of `medium`, and the errors of the coarser levels: they are measured
@@ -140,12 +135,12 @@ impl Measured {
         };
         let figures = pictures.figures();
         let with_stored_light = pictures.single(EXACT);
-        let coarser = |played: &Vec<Vec<f32>>| {
+        let coarser = |played: &[Vec<f32>]| {
             let own = Pictures { played, ..near }.single(0..EXACT.len())?;
             let all = with_stored_light.filter(|all| *all > 0.0)?;
             Some((figures.as_ref()?.rel_rmse * (own / all).sqrt()) as f32)
         };
-        let levels = self.coarser.iter().map(coarser).collect();
+        let levels = self.coarser.chunks(EXACT.len()).map(coarser).collect();
         let error = figures.as_ref().map(|figures| {
             let with_exact_light = near.single(0..EXACT.len());
             let share = match (with_exact_light, with_stored_light) {
