@@ -5,7 +5,7 @@ use super::corners::Corners;
 use super::faults::allocate;
 use super::neighbours::neighbours;
 use super::packed;
-use super::shard::{Shard, Source, ranges};
+use super::shard::{SOURCE, Shard, Source, ranges};
 use super::splatting::SplatPath;
 use super::targets::PixelState;
 use super::uniforms::MediumUniform;
@@ -18,6 +18,9 @@ use diaphane_formats::slopes::Stencil;
 use diaphane_formats::{kernel, sh};
 use std::sync::Arc;
 use wgpu::{Buffer, BufferUsages, Device, Queue};
+
+/// Bytes of a sample's value.
+pub(super) const VALUE: u64 = 16;
 
 /// Everything that stays as long as the asset does.
 #[derive(Clone)]
@@ -39,6 +42,8 @@ pub(super) struct AssetBuffers {
     pub grid: Buffer,
     /// Of all samples, whatever their shard, because slopes look at neighbours; written by the lighting pass.
     pub values: Buffer,
+    /// Objects that have a part of them, and of the shards' sources.
+    pub slots: usize,
     /// As they are played.
     pub info: Info,
     /// Kept for the transmittance of folded lights.
@@ -130,9 +135,10 @@ impl AssetBuffers {
             values: empty_buffer(
                 device,
                 "values",
-                16 * kernels.len() as u64,
+                VALUE * kernels.len() as u64,
                 storage | BufferUsages::COPY_DST,
             ),
+            slots: 1,
             info: info.clone(),
             densities,
             kept: shards.len() > 1 && path == SplatPath::Tiles,
@@ -159,11 +165,30 @@ impl AssetBuffers {
         }
     }
 
+    /// The same with values and sources for so many objects.
+    pub fn with_slots(&self, device: &Device, slots: usize) -> Self {
+        let size = VALUE * u64::from(self.sample_count) * slots as u64;
+        let values = empty_buffer(device, "values", size, self.values.usage());
+        let shards = self.shards.iter().map(|s| s.with_slots(device, slots)).collect();
+        Self { values, shards, slots, ..self.clone() }
+    }
+
+    /// Bytes of values and sources of one of them.
+    pub fn slot_bytes(&self) -> u64 {
+        (VALUE + SOURCE) * u64::from(self.sample_count)
+    }
+
+    /// How many slots bindings hold.
+    pub fn most_slots(&self, device: &Device) -> usize {
+        let largest = self.shards.iter().map(|s| SOURCE * s.range.len() as u64);
+        let largest = largest.max().unwrap_or(0).max(VALUE * u64::from(self.sample_count)).max(1);
+        (Fits::new(device).binding / largest).max(1) as usize
+    }
+
     /// The same object once more, with values and sources of its own.
     pub fn instance(&self, device: &Device) -> Self {
-        let values = empty_buffer(device, "values", self.values.size(), self.values.usage());
-        let shards = self.shards.iter().map(|s| s.instance(device)).collect();
-        Self { values, shards, ..self.clone() }
+        self.with_slots(device, self.slots)
+
     }
 
     /// Gives this instance a medium of its own.

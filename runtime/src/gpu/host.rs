@@ -2,25 +2,29 @@
 //!
 //! ```text
 //! host: opaque geometry -> colour, depth
-//! prepare: [limits] then, object by object from the front: lighting .. segments [clip] gather, compose
+//! prepare: [limits] lighting then, lot by lot from the front: surface .. segments [clip] gather, compose
 //! render: overlay in the host's render pass
 //! ```
 //!
+//! A lot is one large object, or several small ones with the same samples ([`lots`], [`pools`]), which tiles draw together.
 //! Objects attenuate what lies behind them, the host's colours and each other, and cast no shadows on each other. They are
 //! ordered by the distance of their centres; where two run through each other the nearer one counts as in front altogether.
 
 mod interface;
+mod lots;
+mod pools;
 
 pub use interface::{HostDepth, HostFrame, HostReport, Options};
 
 use super::bindings::empty_buffer;
 use super::faults::allocate;
-use super::frame::common_layout;
+use super::frame::{Object, common_layout};
+use super::lot::Lot;
 use super::passes::clip::Clip;
 use super::passes::compose::Compose;
 use super::passes::limits::Limits;
 use super::passes::overlay::Overlay;
-use super::pipeline::{Pipeline, SplatPath};
+use super::pipeline::{Drawn, Pipeline, SplatPath};
 use super::targets::{PixelState, TOTAL, Targets, budget};
 use super::tiles::{Tile, split};
 use super::timers::Timers;
@@ -30,6 +34,8 @@ use crate::frame::Frame;
 use crate::placement::{Placement, covered};
 use crate::{Error, Result};
 use diaphane_formats::asset::{Asset, Info};
+use lots::{Together, arrange};
+use pools::Pools;
 use wgpu::{
     BindGroup, Buffer, BufferUsages, Color, CommandEncoder, Device, Features, LoadOp, Operations, Queue,
     RenderPass, RenderPassColorAttachment, RenderPassDescriptor, StoreOp, TextureView,
@@ -48,14 +54,13 @@ struct Instance {
     placement: Placement,
     /// As they are played.
     info: Info,
-    /// By level, those that were drawn.
-    levels: Vec<Option<Pipeline>>,
 }
 
-/// An asset: its levels, level 0 first, and what is known of them.
+/// An asset: its levels, level 0 first, what is known of them, and what draws objects with them.
 struct Levels {
     pipelines: Vec<Pipeline>,
     details: Vec<Detail>,
+    pools: Vec<Pools>,
 }
 
 /// Buffers of the size of the picture.
@@ -95,6 +100,34 @@ struct Visible {
     instance: usize,
     choice: Choice,
     frame: Frame,
+    tiles: Vec<Tile>,
+    /// Its units of a world unit.
+    per_unit: f32,
+}
+
+/// Which pool draws something: of an asset, a level, one of its pools.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+struct PoolId {
+    asset: usize,
+    level: usize,
+    pool: usize,
+}
+
+/// A level of an object that is in sight, by its place among these.
+struct Part {
+    visible: usize,
+    pool: PoolId,
+    slot: usize,
+    /// See view.wgsl.
+    share: f32,
+}
+
+/// Tiles that are drawn together.
+struct Job {
+    pool: PoolId,
+    lot: Lot,
+    /// The first of their views.
+    view: usize,
     tiles: Vec<Tile>,
 }
 
@@ -142,8 +175,11 @@ impl Renderer {
         let coarser = (1..asset.level_sizes().len())
             .map(|k| all.level(device, &asset.level(k)?))
             .collect::<Result<Vec<_>>>()?;
-        let pipelines = std::iter::once(all).chain(coarser).collect();
-        self.assets.push(Some(Levels { pipelines, details: details(asset) }));
+        let mut pipelines: Vec<Pipeline> = std::iter::once(all).chain(coarser).collect();
+        // Nobody asks for the census.
+        pipelines.iter_mut().for_each(|p| p.counting = false);
+        let pools = pipelines.iter().map(|_| Pools::default()).collect();
+        self.assets.push(Some(Levels { pipelines, details: details(asset), pools }));
         Ok(AssetId(self.assets.len() - 1))
     }
 
@@ -167,9 +203,8 @@ impl Renderer {
         placement.validate()?;
         let levels = self.assets.get(asset.0).and_then(Option::as_ref).ok_or_else(|| missing("asset"))?;
         let info = levels.pipelines[0].asset.info.clone();
-        let levels = levels.pipelines.iter().map(|_| None).collect();
         self.seen = None;
-        self.instances.push(Some(Instance { asset: asset.0, placement, info, levels }));
+        self.instances.push(Some(Instance { asset: asset.0, placement, info }));
         Ok(InstanceId(self.instances.len() - 1))
     }
 
@@ -191,17 +226,25 @@ impl Renderer {
         let asset = self.instance_mut(id)?.asset;
         let baked = self.assets.get(asset).and_then(Option::as_ref).ok_or_else(|| missing("asset"))?;
         let info = edit.apply(&baked.pipelines[0].asset.info)?;
-        let instance = self.instance_mut(id)?;
-        instance.info = info;
-        instance.levels.iter_mut().for_each(|level| *level = None);
-        self.seen = None;
+        self.instance_mut(id)?.info = info;
+        self.release(id);
         Ok(())
     }
 
     /// Takes an object away.
     pub fn remove_instance(&mut self, id: InstanceId) {
+        self.release(id);
         if let Some(instance) = self.instances.get_mut(id.0) {
             *instance = None;
+        }
+    }
+
+    /// Forgets what was made for an object.
+    fn release(&mut self, id: InstanceId) {
+        if let Some(Some(instance)) = self.instances.get(id.0)
+            && let Some(Some(levels)) = self.assets.get_mut(instance.asset)
+        {
+            levels.pools.iter_mut().for_each(|pools| pools.release(id.0));
         }
         self.seen = None;
     }
@@ -233,7 +276,7 @@ impl Renderer {
         if done.is_err() {
             // Whatever was made for this frame may be without memory.
             (self.targets, self.picture, self.seen) = (None, None, None);
-            self.instances.iter_mut().flatten().for_each(|i| i.levels.iter_mut().for_each(|l| *l = None));
+            self.assets.iter_mut().flatten().for_each(|l| l.pools.iter_mut().for_each(|p| *p = Pools::default()));
         }
         done
     }
@@ -259,7 +302,7 @@ impl Renderer {
         let seen = host.depth.is_none().then_some(Seen { frames, exposure: host.exposure });
         let fits = self.picture.as_ref().is_some_and(|p| p.size == host.size);
         if fits && seen.is_some() && self.seen == seen {
-            self.report = HostReport { reused: true, tiles: 0, samples: 0, ..self.report };
+            self.report = HostReport { reused: true, tiles: 0, draws: 0, samples: 0, ..self.report };
             return Ok(());
         }
         self.seen = None;
@@ -267,7 +310,9 @@ impl Renderer {
             self.picture = Some(self.new_picture(device, host.size));
         }
         self.overlay.write(queue, host.size, host.exposure);
-        self.fit_targets(device, &visible)?;
+        let parts = self.parts(device, queue, &visible);
+        let jobs = self.begin(device, queue, &visible, &parts, host.size)?;
+        self.report.draws = jobs.len();
         let (Some(picture), Some((targets, _))) = (&self.picture, &self.targets) else { return Ok(()) };
         encoder.clear_buffer(&picture.total, 0, None);
         encoder.clear_buffer(&picture.opaque, 0, None);
@@ -276,37 +321,115 @@ impl Renderer {
             self.limits.record(device, encoder, host.size, depth, &picture.distances);
         }
         let compose = self.compose.bind(device, targets, &picture.total, &picture.opaque);
+        let clip = host.depth.map(|_| self.clip.bind(device, &picture.distances, targets));
+        let clip = clip.as_ref().map(|group| (&self.clip, group));
         let timers = &mut Timers::off();
-        for Visible { instance, choice, frame, tiles } in &visible {
-            let Some(instance) = &mut self.instances[*instance] else { continue };
-            let Some(Some(levels)) = self.assets.get(instance.asset) else { continue };
-            let Instance { placement, info, levels: own, .. } = instance;
-            let clip = host.depth.map(|_| {
-                let per_unit = (1.0 / placement.scale) as f32;
-                self.clip.bind(device, &picture.distances, targets, per_unit, host.size[0])
-            });
-            for (level, share) in parts(*choice) {
-                let pipeline = own[level].get_or_insert_with(|| {
-                    let mut own = levels.pipelines[level].instance(device);
-                    if own.asset.info.extinction != info.extinction || own.asset.info.albedo != info.albedo {
-                        own.set_own_material(device, queue, info);
-                    }
-                    own
-                });
-                pipeline.share = share;
-                pipeline.begin_in(device, queue, frame, targets)?;
-                pipeline.write_views(device, queue, frame, tiles, &[[0.5; 2]], 0);
-                self.report.lit += usize::from(pipeline.record_lighting(encoder, timers));
-                for (view, tile) in tiles.iter().enumerate() {
-                    pipeline.record_start(encoder, *tile);
-                    let clip = clip.as_ref().map(|group| (&self.clip, group));
-                    pipeline.record_ray(encoder, timers, view, *tile, clip);
-                    self.compose.record(&mut pipeline.recorder(encoder, timers, view, *tile), &compose);
-                }
+        let mut lit = 0;
+        for pool in pools_of(jobs.iter().map(|job| job.pool)) {
+            lit += self.pipeline(pool).map_or(0, |p| p.record_lighting(encoder, timers));
+        }
+        for job in &jobs {
+            let Some(pipeline) = self.pipeline(job.pool) else { continue };
+            pipeline.record_start(encoder, job.lot);
+            pipeline.record_ray(encoder, timers, job.view, job.lot, clip);
+            for (k, tile) in job.tiles.iter().enumerate() {
+                let r = &mut pipeline.recorder(encoder, timers, job.view + k, *tile);
+                self.compose.record(r, &compose);
             }
         }
+        self.report.lit = lit;
         self.seen = seen;
         Ok(())
+    }
+
+    /// The levels of all objects in sight, the nearest object first, and where they are drawn.
+    fn parts(&mut self, device: &Device, queue: &Queue, visible: &[Visible]) -> Vec<Part> {
+        let mut parts = Vec::new();
+        for (v, seen) in visible.iter().enumerate() {
+            let Some(Some(Instance { asset, info, .. })) = self.instances.get(seen.instance) else { continue };
+            let Some(Some(levels)) = self.assets.get_mut(*asset) else { continue };
+            for (level, share) in shares(seen.choice) {
+                let pipeline = &levels.pipelines[level];
+                let baked = &pipeline.asset.info;
+                let is_edited = baked.extinction != info.extinction || baked.albedo != info.albedo;
+                let berth = levels.pools[level].place(
+                    device,
+                    queue,
+                    pipeline,
+                    seen.instance,
+                    is_edited.then_some(info),
+                );
+                let pool = PoolId { asset: *asset, level, pool: berth.pool };
+                parts.push(Part { visible: v, pool, slot: berth.slot, share });
+            }
+        }
+        parts
+    }
+
+    /// Uploads lights and views of all parts, and says what is drawn together.
+    fn begin(
+        &mut self,
+        device: &Device,
+        queue: &Queue,
+        visible: &[Visible],
+        parts: &[Part],
+        size: [u32; 2],
+    ) -> Result<Vec<Job>> {
+        let state = self.pixel_state(visible);
+        let picture = u64::from(size[0]) * u64::from(size[1]);
+        let most = match self.path {
+            SplatPath::Tiles => budget(device, state, TOTAL).pixels().min(picture),
+            // They are blended one object after the other.
+            SplatPath::Quads => 0,
+        };
+        let (owners, tiles): (Vec<usize>, Vec<(PoolId, Tile)>) = parts
+            .iter()
+            .enumerate()
+            .flat_map(|(p, part)| visible[part.visible].tiles.iter().map(move |t| (p, (part.pool, *t))))
+            .unzip();
+        let together = arrange(&tiles, most);
+        // At least a pixel where nothing is in sight.
+        let least = Lot::from(Tile { start: [0; 2], size: [1; 2] });
+        let needed = together.iter().map(Together::lot).fold(least, Lot::or);
+        let targets = self.fit_targets(device, needed, state)?;
+        for pool in pools_of(parts.iter().map(|p| p.pool)) {
+            let objects: Vec<Object> = parts
+                .iter()
+                .filter(|p| p.pool == pool)
+                .map(|p| Object { slot: p.slot, frame: &visible[p.visible].frame, exact: None })
+                .collect();
+            if let Some(pipeline) = self.pipeline_mut(pool) {
+                pipeline.begin_in(device, queue, &objects, &targets)?;
+            }
+        }
+        let mut jobs = Vec::new();
+        for Together { kind, members, .. } in together {
+            let drawn = |m: &usize| {
+                let Part { visible: v, slot, share, .. } = parts[owners[*m]];
+                let Visible { frame, per_unit, .. } = &visible[v];
+                Drawn { slot, frame, tile: tiles[*m].1, share, per_unit: *per_unit }
+            };
+            let drawn: Vec<Drawn> = members.iter().map(drawn).collect();
+            let Some(pipeline) = self.pipeline_mut(kind) else { continue };
+            let (lot, view) = pipeline.add_lot(&drawn);
+            jobs.push(Job { pool: kind, lot, view, tiles: drawn.iter().map(|d| d.tile).collect() });
+        }
+        for pool in pools_of(jobs.iter().map(|job| job.pool)) {
+            if let Some(pipeline) = self.pipeline_mut(pool) {
+                pipeline.upload_views(device, queue);
+            }
+        }
+        Ok(jobs)
+    }
+
+    fn pipeline(&self, id: PoolId) -> Option<&Pipeline> {
+        let levels = self.assets.get(id.asset)?.as_ref()?;
+        Some(&levels.pools.get(id.level)?.get(id.pool)?.pipeline)
+    }
+
+    fn pipeline_mut(&mut self, id: PoolId) -> Option<&mut Pipeline> {
+        let levels = self.assets.get_mut(id.asset)?.as_mut()?;
+        Some(&mut levels.pools.get_mut(id.level)?.get_mut(id.pool)?.pipeline)
     }
 
     /// Draws the picture over the colours of the pass's viewport.
@@ -360,8 +483,9 @@ impl Renderer {
             let choice = self.fineness.choose(&levels.details, pixels, state.heterogeneous);
             report.fading += usize::from(choice.coarser > 0.0);
             let samples = |(level, _): (usize, f32)| u64::from(levels.pipelines[level].asset.sample_count);
-            report.samples += parts(choice).map(samples).sum::<u64>();
-            visible.push((distance, Visible { instance: index, choice, frame, tiles }));
+            report.samples += shares(choice).map(samples).sum::<u64>();
+            let per_unit = (1.0 / placement.scale) as f32;
+            visible.push((distance, Visible { instance: index, choice, frame, tiles, per_unit }));
         }
         visible.sort_by(|a, b| a.0.total_cmp(&b.0));
         Ok((visible.into_iter().map(|(_, v)| v).collect(), report))
@@ -372,29 +496,25 @@ impl Renderer {
         self.assets.get(instance.asset)?.as_ref()
     }
 
-    /// Sees that the targets hold the largest tile and all that objects keep.
-    fn fit_targets(&mut self, device: &Device, visible: &[Visible]) -> Result<()> {
-        let mut needed = Tile { start: [0; 2], size: [1; 2] };
-        let mut state = PixelState::default();
-        for v in visible {
-            for tile in &v.tiles {
-                (0..2).for_each(|c| needed.size[c] = needed.size[c].max(tile.size[c]));
-            }
-            if let Some(levels) = self.levels_of(v.instance) {
-                state = state.or(levels.pipelines[0].asset.pixel_state());
-            }
-        }
+    /// All that objects keep for a pixel.
+    fn pixel_state(&self, visible: &[Visible]) -> PixelState {
+        let levels = visible.iter().filter_map(|v| self.levels_of(v.instance));
+        levels.map(|l| l.pipelines[0].asset.pixel_state()).fold(PixelState::default(), PixelState::or)
+    }
+
+    /// Targets that hold every lot and all that objects keep.
+    fn fit_targets(&mut self, device: &Device, needed: Lot, state: PixelState) -> Result<Targets> {
+        let (mut lot, mut needs) = (needed, state);
         if let Some((targets, known)) = &self.targets {
-            let fits = (0..2).all(|c| targets.size[c] >= needed.size[c]) && known.or(state) == *known;
-            if fits {
-                return Ok(());
+            if targets.lot.holds(needed) && known.or(state) == *known {
+                return Ok(targets.clone());
             }
-            state = state.or(*known);
-            (0..2).for_each(|c| needed.size[c] = needed.size[c].max(targets.size[c]));
+            (lot, needs) = (targets.lot.or(needed), known.or(state));
         }
-        let bytes = budget(device, state, TOTAL).pixel_total * needed.pixels();
-        self.targets = Some((Targets::allocate(device, state, needed, self.path, bytes)?, state));
-        Ok(())
+        let bytes = budget(device, needs, TOTAL).pixel_total * lot.pixels;
+        let targets = Targets::allocate(device, needs, lot, self.path, bytes)?;
+        self.targets = Some((targets.clone(), needs));
+        Ok(targets)
     }
 
     fn new_picture(&self, device: &Device, size: [u32; 2]) -> Picture {
@@ -409,13 +529,21 @@ impl Renderer {
 }
 
 /// The levels to draw, one after the other, and their shares as view.wgsl knows them.
-fn parts(choice: Choice) -> impl Iterator<Item = (usize, f32)> {
+fn shares(choice: Choice) -> impl Iterator<Item = (usize, f32)> {
     let Choice { level, coarser } = choice;
     let (first, second) = match coarser > 0.0 {
         true => ((level, coarser - 1.0), Some((level + 1, coarser))),
         false => ((level, 1.0), None),
     };
     std::iter::once(first).chain(second)
+}
+
+/// Each once.
+fn pools_of(ids: impl Iterator<Item = PoolId>) -> Vec<PoolId> {
+    let mut ids: Vec<PoolId> = ids.collect();
+    ids.sort_unstable();
+    ids.dedup();
+    ids
 }
 
 fn missing(what: &str) -> Error {

@@ -24,6 +24,7 @@ mod faults;
 mod frame;
 mod headless;
 mod host;
+mod lot;
 mod neighbours;
 mod packed;
 mod passes;

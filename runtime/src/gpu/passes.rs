@@ -21,48 +21,50 @@ pub(super) mod surface;
 
 use wgpu::{BindGroup, Buffer, CommandEncoder, ComputePassDescriptor, ComputePipeline};
 
+use super::lot::Lot;
 use super::shard::Shard;
 use super::timers::{Pass, Timers};
 
-/// What a pass is recorded with: the command buffer, the shared group and the ray's place in it.
+/// What a pass is recorded with: the command buffer, the shared group and the rays' place in it.
 pub(super) struct Recorder<'a> {
     pub encoder: &'a mut CommandEncoder,
     pub timers: &'a mut Timers,
     /// One for each of the object's shards, of which passes that mind no samples take the first.
     pub common: &'a [BindGroup],
+    /// Of the first view.
     pub view_offset: u32,
-    /// Columns and rows of the tile; the targets may be larger.
-    pub tile: [u32; 2],
+    /// The tiles that are drawn; the targets may be larger.
+    pub lot: Lot,
 }
 
 impl Recorder<'_> {
-    /// Workgroups of 8 × 8 that cover the tile.
-    fn pixel_groups(&self) -> [u32; 2] {
-        self.tile.map(|n| n.div_ceil(8))
+    /// Workgroups of 8 × 8 that cover each of the tiles.
+    fn pixel_groups(&self) -> [u32; 3] {
+        let [x, y] = self.lot.size.map(|n| n.div_ceil(8));
+        [x, y, self.lot.count]
     }
 
-    /// Clears what a buffer keeps for the tile, so many bytes a pixel.
+    /// Clears what a buffer keeps for the tiles, so many bytes a pixel.
     fn clear_pixels(&mut self, buffer: &Buffer, bytes: u64) {
-        let pixels = u64::from(self.tile[0]) * u64::from(self.tile[1]);
-        self.encoder.clear_buffer(buffer, 0, Some(bytes * pixels));
+        self.encoder.clear_buffer(buffer, 0, Some(bytes * self.lot.pixels));
     }
 
-    /// Points a render pass at the tile and the shared group.
-    fn aim(common: &[BindGroup], view_offset: u32, tile: [u32; 2], render: &mut wgpu::RenderPass<'_>) {
-        render.set_viewport(0.0, 0.0, tile[0] as f32, tile[1] as f32, 0.0, 1.0);
+    /// Points a render pass at tiles up to a size and the shared group.
+    fn aim(common: &[BindGroup], view_offset: u32, [width, height]: [u32; 2], render: &mut wgpu::RenderPass<'_>) {
+        render.set_viewport(0.0, 0.0, width as f32, height as f32, 0.0, 1.0);
         render.set_bind_group(0, &common[0], &[view_offset]);
     }
 
-    /// Runs a compute pass over the tile's pixels that no timer watches.
+    /// Runs a compute pass over the tiles' pixels that no timer watches.
     fn over_pixels(&mut self, label: &str, pipeline: &ComputePipeline, group: &BindGroup) {
-        let [x, y] = self.pixel_groups();
+        let [x, y, z] = self.pixel_groups();
         let mut compute = self
             .encoder
             .begin_compute_pass(&ComputePassDescriptor { label: Some(label), timestamp_writes: None });
         compute.set_pipeline(pipeline);
         compute.set_bind_group(0, &self.common[0], &[self.view_offset]);
         compute.set_bind_group(1, group, &[]);
-        compute.dispatch_workgroups(x, y, 1);
+        compute.dispatch_workgroups(x, y, z);
     }
 
     /// Runs a compute pass; `dispatch` starts its workgroups.
@@ -96,20 +98,18 @@ impl Recorder<'_> {
         }
     }
 
-    /// The same with a thread for every sample, `rounds` times each.
+    /// The same with a thread for every sample of every object.
     fn over_samples(
         &mut self,
         pass: Pass,
         pipeline: &ComputePipeline,
         groups: &[BindGroup],
         shards: &[Shard],
-        rounds: u32,
     ) {
+        let count = self.lot.count;
         self.over_shards(pass, pipeline, groups, |pass, k| {
             let [columns, rows] = shards[k].sample_groups();
-            for _ in 0..rounds {
-                pass.dispatch_workgroups(columns, rows, 1);
-            }
+            pass.dispatch_workgroups(columns, rows, count);
         });
     }
 }

@@ -285,13 +285,13 @@ impl PictureRenderer {
         let Some(targets) = self.passes.targets() else {
             return;
         };
-        let size = 16 * u64::from(targets.size[0]) * u64::from(targets.size[1]);
+        let size = 16 * targets.lot.pixels;
         let times = self.timers.buffer();
         let times = times.map(|(buffer, size)| readback::copy(device, encoder, buffer, size));
         self.pending = Some(Pending {
             counters: readback::copy(device, encoder, &targets.counters, size),
             census: readback::copy(device, encoder, &targets.census, CENSUS),
-            size: targets.size,
+            size: targets.lot.size,
             timers: times.zip(self.timers.reading()),
             arrived: None,
             rays,

@@ -1,7 +1,8 @@
 //! The passes of a frame with everything that they read and write.
 
 use super::asset::AssetBuffers;
-use super::frame::{FrameBuffers, VIEW_STRIDE, common_layout};
+use super::frame::{FrameBuffers, Lit, Object, VIEW_STRIDE, common_layout};
+use super::lot::Lot;
 use super::passes::Recorder;
 use super::passes::batches::Batches;
 use super::passes::boundary::Boundary;
@@ -19,7 +20,7 @@ use super::splatting::Splatting;
 use super::targets::{COUNTERS, LEAST, RADIANCE, TOTAL, Targets, budget};
 use super::tiles::{Tile, split};
 use super::timers::Timers;
-use super::uniforms::{LightLayout, ViewUniform};
+use super::uniforms::ViewUniform;
 use crate::exact::ExactDepths;
 use crate::fold::{LightCounts, LightingKey};
 use crate::frame::Frame;
@@ -45,17 +46,31 @@ pub(super) struct Pipeline {
     frame: FrameBuffers,
     /// Whether later frames may keep the sources of an earlier one.
     pub(super) reuse: bool,
-    /// What the sources that are there depend on.
-    lit: Option<LightingKey>,
-    /// Whether the frame that was begun needs other sources.
-    relight: bool,
+    /// What is counted beside the pictures, [`crate::rendered::Census`].
+    pub(super) counting: bool,
+    /// What the sources that are there depend on, by slot.
+    lit: Vec<Option<LightingKey>>,
+    /// The same for those that the frame that was begun makes anew, and these themselves, the most lights first.
+    pending: Vec<(usize, LightingKey)>,
+    relit: Vec<Lit>,
+    /// The views of the frame that was begun, first those of [`Self::relit`].
+    views: Vec<ViewUniform>,
     targets: Option<(Targets, Groups)>,
-    /// `share` of view.wgsl.
-    pub(super) share: f32,
     /// Bytes that the state of all pixels may take.
     pub(super) most_memory: u64,
     /// Bytes that the latest targets take, about.
     tile_memory: u64,
+}
+
+/// One tile of an object, as it is drawn with others.
+pub(super) struct Drawn<'a> {
+    pub slot: usize,
+    pub frame: &'a Frame,
+    pub tile: Tile,
+    /// `share` of view.wgsl.
+    pub share: f32,
+    /// The object's units of a world unit.
+    pub per_unit: f32,
 }
 
 /// The groups of all passes; those that mind samples have one for each shard.
@@ -101,10 +116,12 @@ impl Pipeline {
             common,
             asset,
             reuse: false,
-            lit: None,
-            relight: true,
+            counting: true,
+            lit: Vec::new(),
+            pending: Vec::new(),
+            relit: Vec::new(),
+            views: Vec::new(),
             targets: None,
-            share: 1.0,
             most_memory: TOTAL,
             tile_memory: 0,
         })
@@ -118,7 +135,7 @@ impl Pipeline {
     /// Takes extinction and albedo from an edited asset's parameters.
     pub(super) fn set_material(&mut self, device: &Device, queue: &Queue, info: &Info) {
         self.asset.set_material(queue, info);
-        self.lit = None;
+        self.lit.clear();
         self.renew_variant(device);
     }
 
@@ -144,11 +161,11 @@ impl Pipeline {
         exact: Option<&ExactDepths>,
         area: [[u32; 2]; 2],
     ) -> Result<Vec<Tile>> {
-        let key = self.light(device, queue, frame, exact)?;
+        self.light(device, queue, &[Object { slot: 0, frame, exact }])?;
         let mut tiles = self.split(device, area)?;
         // The first tile is the largest; `split` returns at least one.
-        let size = tiles[0].size;
-        let fits = self.targets.as_ref().is_some_and(|(t, _)| (0..2).all(|c| t.size[c] >= size[c]));
+        let lot = Lot::from(tiles[0]);
+        let fits = self.targets.as_ref().is_some_and(|(t, _)| t.lot.holds(lot));
         if !fits || self.frame.take_changed() {
             let mut old = self.targets.take().map(|(t, _)| t).filter(|_| fits);
             let targets = loop {
@@ -161,7 +178,7 @@ impl Pipeline {
             let groups = self.groups(device, &targets);
             self.targets = Some((targets, groups));
         }
-        self.lit = Some(key);
+        self.keep_lit();
         Ok(tiles)
     }
 
@@ -175,7 +192,7 @@ impl Pipeline {
     fn allocate(&mut self, device: &Device, tile: Tile) -> Result<Targets> {
         let state = self.asset.pixel_state();
         self.tile_memory = budget(device, state, self.most_memory).pixel_total * tile.pixels();
-        Targets::allocate(device, state, tile, self.path(), self.tile_memory)
+        Targets::allocate(device, state, tile.into(), self.path(), self.tile_memory)
     }
 
     /// Draws in tiles of half the memory from now on, because there is none for `what`. False where they are small already.
@@ -193,26 +210,47 @@ impl Pipeline {
     /// Forgets what the size of the picture decides, so that it is made anew.
     pub(super) fn forget_targets(&mut self) {
         self.targets = None;
-        self.lit = None;
+        self.lit.clear();
     }
 
-    /// Uploads a frame's lights where they need other sources. The key that comes back is to be kept in `lit` when all went
-    /// well.
-    fn light(
-        &mut self,
-        device: &Device,
-        queue: &Queue,
-        frame: &Frame,
-        exact: Option<&ExactDepths>,
-    ) -> Result<LightingKey> {
-        let key = LightingKey::new(frame, &self.asset.info, exact);
-        self.relight = !self.reuse || self.lit.as_ref() != Some(&key);
-        // Not before all went well.
-        self.lit = None;
-        if self.relight {
-            self.frame.write_lights(device, queue, &self.asset, frame, exact)?;
+    /// Uploads the lights of objects that need other sources.
+    fn light(&mut self, device: &Device, queue: &Queue, objects: &[Object<'_>]) -> Result<()> {
+        let lights = objects.iter().map(|o| o.frame.lights.len()).max().unwrap_or(0);
+        self.lit.resize(self.asset.slots, None);
+        if self.frame.reserve(device, self.asset.slots, lights)? {
+            self.lit.fill(None);
         }
-        Ok(key)
+        let mut stale = Vec::new();
+        self.pending.clear();
+        for object in objects {
+            let key = LightingKey::new(object.frame, &self.asset.info, object.exact);
+            if !self.reuse || self.lit[object.slot].as_ref() != Some(&key) {
+                // Not before all went well.
+                self.lit[object.slot] = None;
+                self.pending.push((object.slot, key));
+                stale.push(*object);
+            }
+        }
+        self.relit = if stale.is_empty() {
+            Vec::new()
+        } else {
+            self.frame.write_lights(device, queue, &self.asset, &stale)?
+        };
+        self.relit.sort_by_key(|lit| std::cmp::Reverse(lit.lights));
+        let frame_of = |slot: usize| stale.iter().find(|o| o.slot == slot).map(|o| o.frame);
+        let pixel = Tile { start: [0; 2], size: [1; 2] };
+        self.views.clear();
+        for lit in &self.relit {
+            self.views.extend(frame_of(lit.slot).map(|f| self.view(lit.slot, f, pixel, [0.5; 2], 1)));
+        }
+        Ok(())
+    }
+
+    /// Remembers what the sources depend on that are made now.
+    fn keep_lit(&mut self) {
+        for (slot, key) in self.pending.drain(..) {
+            self.lit[slot] = Some(key);
+        }
     }
 
     /// The same object once more, with lights and sources of its own.
@@ -250,36 +288,52 @@ impl Pipeline {
             splatting: self.splatting.clone(),
             frame: FrameBuffers::new(device, &self.common, &asset),
             reuse: true,
-            lit: None,
-            relight: true,
+            counting: self.counting,
+            lit: Vec::new(),
+            pending: Vec::new(),
+            relit: Vec::new(),
+            views: Vec::new(),
             asset,
             targets: None,
-            share: 1.0,
             most_memory: self.most_memory,
             tile_memory: 0,
         }
     }
 
-    /// As [`Self::begin`] with targets that others use too, large enough for what is to be drawn.
+    /// Makes room for the values and sources of so many objects; those that are there are gone then.
+    pub(super) fn set_slots(&mut self, device: &Device, slots: usize) {
+        self.asset = self.asset.with_slots(device, slots);
+        self.lit.clear();
+        self.targets = None;
+    }
+
+    /// Begins a frame of several objects, with targets that others use too, large enough for what is to be drawn.
+    ///
+    /// # Errors
+    /// The lights are too large for the device.
     pub(super) fn begin_in(
         &mut self,
         device: &Device,
         queue: &Queue,
-        frame: &Frame,
+        objects: &[Object<'_>],
         targets: &Targets,
     ) -> Result<()> {
-        let key = self.light(device, queue, frame, None)?;
+        self.light(device, queue, objects)?;
         let stale = self.targets.as_ref().is_none_or(|(known, _)| known.pieces != targets.pieces);
         if self.frame.take_changed() || stale {
             let groups = self.groups(device, targets);
             self.targets = Some((targets.clone(), groups));
         }
-        self.lit = Some(key);
+        self.keep_lit();
         Ok(())
     }
 
-    /// Uploads the rays of some tiles: view `t * offsets.len() + o` is offset o in tile t, added to pictures of `before`
-    /// rays.
+    fn view(&self, slot: usize, frame: &Frame, tile: Tile, offset: [f32; 2], rays: u32) -> ViewUniform {
+        ViewUniform::new(frame, self.asset.diagonal, tile, offset, rays, self.frame.layout(slot))
+    }
+
+    /// Uploads the rays of some tiles of the object that was begun: view `t * offsets.len() + o` is offset o in tile t, added to
+    /// pictures of `before` rays.
     pub(super) fn write_views(
         &mut self,
         device: &Device,
@@ -289,28 +343,36 @@ impl Pipeline {
         offsets: &[[f32; 2]],
         before: u32,
     ) {
-        let mut views = Vec::with_capacity(tiles.len() * offsets.len());
+        self.views.truncate(self.relit.len());
         for &tile in tiles {
-            let diagonal = self.asset.diagonal;
-            let lights = LightLayout {
-                single: self.frame.plan.single.len() as u32,
-                environment: self.frame.plan.environment as u32,
-                negligible: self.frame.plan.negligible,
-                first_scene_light: self.frame.first_scene_light,
-                means: self.frame.means,
-            };
-            let view = |(&offset, rays)| ViewUniform {
-                share: self.share,
-                ..ViewUniform::new(frame, diagonal, tile, offset, rays, lights)
-            };
-            views.extend(offsets.iter().zip(before + 1..).map(view));
+            for (&offset, rays) in offsets.iter().zip(before + 1..) {
+                self.views.push(self.view(0, frame, tile, offset, rays));
+            }
         }
-        self.frame.write_views(device, queue, &self.common, &self.asset, &views);
+        self.upload_views(device, queue);
+    }
+
+    /// Adds the views of objects that are drawn together, a ray through the middle of every pixel. Says how much they are, and which
+    /// view is their first.
+    pub(super) fn add_lot(&mut self, drawn: &[Drawn<'_>]) -> (Lot, usize) {
+        let first = self.views.len();
+        let mut lot = Lot::default();
+        for d in drawn {
+            let view = self.view(d.slot, d.frame, d.tile, [0.5; 2], 1).at(lot.add(d.tile));
+            self.views.push(ViewUniform { share: d.share, per_unit: d.per_unit, ..view });
+        }
+        self.views[first..].iter_mut().for_each(|view| view.viewport = lot.size);
+        (lot, first - self.relit.len())
+    }
+
+    /// Uploads the views that were added.
+    pub(super) fn upload_views(&mut self, device: &Device, queue: &Queue) {
+        self.frame.write_views(device, queue, &self.common, &self.asset, &self.views);
     }
 
     /// What became of the lights of the frame that was begun.
     pub(super) fn light_counts(&self) -> LightCounts {
-        self.frame.plan.counts(self.frame.fold_error(), None)
+        self.frame.plan(0).map_or_else(LightCounts::default, |p| p.counts(self.frame.fold_error(), None))
     }
 
     /// The layout of the group that all passes share.
@@ -318,16 +380,16 @@ impl Pipeline {
         &self.common
     }
 
-    /// Where the passes of a view are recorded.
+    /// Where the passes of a lot are recorded whose first view is `view`.
     pub(super) fn recorder<'a>(
         &'a self,
         encoder: &'a mut CommandEncoder,
         timers: &'a mut Timers,
         view: usize,
-        tile: Tile,
+        lot: impl Into<Lot>,
     ) -> Recorder<'a> {
-        let view_offset = (view as u64 * VIEW_STRIDE) as u32;
-        Recorder { encoder, timers, common: self.frame.common(), view_offset, tile: tile.size }
+        let view_offset = ((self.relit.len() + view) as u64 * VIEW_STRIDE) as u32;
+        Recorder { encoder, timers, common: self.frame.common(), view_offset, lot: lot.into() }
     }
 
     /// The targets of the frame that was begun.
@@ -335,44 +397,45 @@ impl Pipeline {
         self.targets.as_ref().map(|(t, _)| t)
     }
 
-    /// Records the lighting of all samples where they need it; says whether they do.
-    pub(super) fn record_lighting(&self, encoder: &mut CommandEncoder, timers: &mut Timers) -> bool {
-        let Some((_, groups)) = &self.targets else { return false };
-        if self.asset.sample_count > 0 && self.relight {
-            let mut r =
-                Recorder { encoder, timers, common: self.frame.common(), view_offset: 0, tile: [0; 2] };
-            let lights = self.frame.plan.single.len();
-            self.lighting.record(&mut r, &groups.lighting, &self.asset, lights);
-            if !self.frame.plan.folded.is_empty() {
+    /// Records the lighting of all samples of the objects that need it; says how many do.
+    pub(super) fn record_lighting(&self, encoder: &mut CommandEncoder, timers: &mut Timers) -> usize {
+        let Some((_, groups)) = &self.targets else { return 0 };
+        if self.asset.sample_count > 0 && !self.relit.is_empty() {
+            let lot = Lot { count: self.relit.len() as u32, ..Lot::default() };
+            let mut r = Recorder { encoder, timers, common: self.frame.common(), view_offset: 0, lot };
+            self.lighting.record(&mut r, &groups.lighting, &self.asset, &self.relit);
+            let folds = |lit: &Lit| self.frame.plan(lit.slot).is_some_and(|p| !p.folded.is_empty());
+            if self.relit.iter().any(folds) {
                 self.fold.record(&mut r, &groups.fold, &self.asset);
             }
             self.slopes.record(&mut r, &groups.slopes, &self.asset);
         }
-        self.relight
+        self.relit.len()
     }
 
-    /// Records the start of a tile: an empty picture.
-    pub(super) fn record_start(&self, encoder: &mut CommandEncoder, tile: Tile) {
+    /// Records the start of a lot: an empty picture.
+    pub(super) fn record_start(&self, encoder: &mut CommandEncoder, lot: impl Into<Lot>) {
         let Some((targets, _)) = &self.targets else { return };
+        let pixels = lot.into().pixels;
         for (buffer, bytes) in [(&targets.radiance, RADIANCE), (&targets.counters, COUNTERS)] {
-            encoder.clear_buffer(buffer, 0, Some(bytes * tile.pixels()));
+            encoder.clear_buffer(buffer, 0, Some(bytes * pixels));
         }
         encoder.clear_buffer(&targets.census, 0, None);
     }
 
-    /// Records one ray of every pixel of a tile, added to the picture.
+    /// Records one ray of every pixel of a lot, added to the picture.
     pub(super) fn record_ray(
         &self,
         encoder: &mut CommandEncoder,
         timers: &mut Timers,
         view: usize,
-        tile: Tile,
+        lot: impl Into<Lot>,
         clip: Option<(&Clip, &BindGroup)>,
     ) {
         let Some((targets, groups)) = &self.targets else {
             return;
         };
-        let r = &mut self.recorder(encoder, timers, view, tile);
+        let r = &mut self.recorder(encoder, timers, view, lot);
         self.surface.record(r, &groups.surface, &self.asset, targets);
         if let (Some(boundary), Some(group)) = (&self.boundary, &groups.boundary) {
             boundary.record(r, group, &self.asset, targets);
@@ -381,8 +444,10 @@ impl Pipeline {
         if let Some((clip, group)) = clip {
             clip.record(r, group);
         }
-        self.outlines.record(r, &groups.outlines, &self.asset);
-        self.batches.record(r, &groups.batches, &self.asset);
+        if self.counting || self.path() == SplatPath::Quads {
+            self.outlines.record(r, &groups.outlines, &self.asset);
+            self.batches.record(r, &groups.batches, &self.asset);
+        }
         for (k, piece) in groups.pieces.iter().enumerate() {
             if let (Some(profile), Some(group)) = (&self.profile, &piece.profile) {
                 profile.record(r, group, targets, k);

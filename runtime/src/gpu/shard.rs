@@ -20,7 +20,7 @@ pub(super) const BATCH: usize = 64;
 /// Bytes of a sample in the largest of its buffers, the spokes: codes of fourteen bands are less.
 const LARGEST: u64 = 16 * NEIGHBOURS as u64;
 /// Bytes of a source, and of an outline.
-const SOURCE: u64 = 64;
+pub(super) const SOURCE: u64 = 64;
 const OUTLINE: u64 = 24;
 
 /// Bytes of one piece's indirect draw in [`Shard::batches`], and of all of them.
@@ -132,9 +132,10 @@ impl Shard {
         self.medium = filled_buffer(device, "medium", &[self.uniform(material)], usage);
     }
 
-    /// The same samples with sources of their own.
-    pub fn instance(&self, device: &Device) -> Self {
-        let sources = empty_buffer(device, "sources", self.sources.size(), self.sources.usage());
+    /// The same samples with sources for so many objects.
+    pub fn with_slots(&self, device: &Device, slots: usize) -> Self {
+        let size = SOURCE * self.range.len() as u64 * slots as u64;
+        let sources = empty_buffer(device, "sources", size, self.sources.usage());
         Self { sources, ..self.clone() }
     }
 

@@ -1,9 +1,10 @@
-//! State of the pixels of one tile.
+//! State of the pixels of tiles that are drawn together.
 
 use super::bindings::empty_buffer;
 use super::faults::allocate;
+use super::lot::Lot;
 use super::splatting::SplatPath;
-use super::tiles::{Budget, Tile};
+use super::tiles::Budget;
 use crate::Result;
 use crate::rendered::MAX_PIECES;
 use diaphane_formats::reconstruct::PROFILE_CELLS;
@@ -43,10 +44,11 @@ const LISTS: u64 = 256;
 const LISTED: u64 = 4;
 const PROFILE: u64 = 16 * (PROFILE_CELLS as u64 + 1);
 
-/// Buffers and textures for a tile of a given number of columns and rows.
+/// Buffers and textures for tiles that are drawn together.
 #[derive(Clone)]
 pub(super) struct Targets {
-    pub size: [u32; 2],
+    /// What they hold.
+    pub lot: Lot,
     /// Pixels, padded so that each piece's part starts at a multiple of 256 bytes.
     stride: u64,
     pub crossings: Buffer,
@@ -115,34 +117,33 @@ pub(super) fn budget(device: &Device, state: PixelState, total: u64) -> Budget {
 pub(super) const LEAST: u64 = 1 << 20;
 
 impl Targets {
-    /// Targets for tiles up to the size of `tile`, which take about `bytes`.
+    /// Targets for lots up to the size of `lot`, which take about `bytes`.
     ///
     /// # Errors
     /// [`crate::Error::GpuMemory`].
     pub fn allocate(
         device: &Device,
         needs: PixelState,
-        tile: Tile,
+        lot: Lot,
         path: SplatPath,
         bytes: u64,
     ) -> Result<Self> {
-        let [w, h] = tile.size;
-        let what = || format!("the state of {w} x {h} pixels ({:.1} MB)", bytes as f64 / 1e6);
-        allocate(device, what, || Ok(Self::new(device, needs, tile, path)))
+        let Lot { size: [w, h], count, .. } = lot;
+        let tiles = if count > 1 { format!("{count} tiles of up to ") } else { String::new() };
+        let what = || format!("the state of {tiles}{w} x {h} pixels ({:.1} MB)", bytes as f64 / 1e6);
+        allocate(device, what, || Ok(Self::new(device, needs, lot, path)))
     }
 
-    fn new(device: &Device, needs: PixelState, tile: Tile, path: SplatPath) -> Self {
-        let pixels = tile.pixels();
+    fn new(device: &Device, needs: PixelState, lot: Lot, path: SplatPath) -> Self {
+        let pixels = lot.pixels;
         let stride = pixels.next_multiple_of(16);
-        let cell_stride =
-            tile.size.iter().map(|n| u64::from(n.div_ceil(8))).product::<u64>().next_multiple_of(32);
-        let tile_stride =
-            tile.size.iter().map(|n| u64::from(n.div_ceil(16))).product::<u64>().next_multiple_of(64);
+        let cell_stride = lot.cells.next_multiple_of(32);
+        let tile_stride = lot.tiles.next_multiple_of(64);
         let state = BufferUsages::STORAGE | BufferUsages::COPY_DST;
         let read = state | BufferUsages::COPY_SRC;
         let buffer = |label: &str, size: u64, usage| empty_buffer(device, label, size, usage);
         // Only quads are blended.
-        let blended = if path == SplatPath::Quads { tile.size } else { [1; 2] };
+        let blended = if path == SplatPath::Quads { lot.size } else { [1; 2] };
         let texture = |label: &str, format, [width, height]: [u32; 2]| {
             let texture = device.create_texture(&TextureDescriptor {
                 label: Some(label),
@@ -157,7 +158,7 @@ impl Targets {
             texture.create_view(&Default::default())
         };
         Self {
-            size: tile.size,
+            lot,
             stride,
             crossings: buffer("crossings", CROSSINGS * pixels, state),
             boundary: buffer("boundary", if needs.fresnel { BOUNDARY * pixels } else { 0 }, state),
@@ -175,7 +176,7 @@ impl Targets {
             cells: buffer("cells", CELL * MAX_PIECES as u64 * cell_stride, state),
             census: buffer("census", CENSUS, read),
             kept: buffer("kept", if needs.kept { KEPT * pixels } else { 0 }, state),
-            marker: texture("marker", MARKER_FORMAT, tile.size),
+            marker: texture("marker", MARKER_FORMAT, lot.size),
             numerator: texture("numerator", SUM_FORMAT, blended),
             denominator: texture("denominator", SUM_FORMAT, blended),
         }

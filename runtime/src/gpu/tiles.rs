@@ -33,15 +33,20 @@ pub(super) struct Budget {
     pub pixel_total: u64,
 }
 
+impl Budget {
+    /// Most pixels of a tile. Buffers are made for padded numbers of them: see `targets`.
+    pub fn pixels(self) -> u64 {
+        (self.binding / self.pixel_binding).min(self.total / self.pixel_total).saturating_sub(16)
+    }
+}
+
 /// Splits a picture into bands of whole rows where they fit, else into columns of bands. All tiles but those at the
 /// right and lower edge have the same size.
 ///
 /// # Errors
 /// Not even one pixel fits.
 pub(super) fn split(width: u32, height: u32, budget: Budget) -> Result<Vec<Tile>> {
-    let most = (budget.binding / budget.pixel_binding).min(budget.total / budget.pixel_total);
-    // Buffers of padded pixel counts: see `targets`.
-    let most = most.saturating_sub(16);
+    let most = budget.pixels();
     let columns = u64::from(width.min(budget.side)).min(most) as u32;
     if columns == 0 {
         return Err(Error::Gpu("the adapter's buffers are too small for a single pixel".to_owned()));

@@ -11,6 +11,7 @@ use diaphane_formats::kernel;
 use diaphane_formats::slopes::{CELL_RADIUS, STEEPEST, means_share};
 use glam::{DVec3, Vec3};
 
+use super::lot::Place;
 use super::tiles::Tile;
 
 /// Surface nearer to the camera than this fraction of the diagonal is not seen.
@@ -42,7 +43,15 @@ pub(super) struct ViewUniform {
     pub share: f32,
     pub environment: u32,
     pub negligible: f32,
-    pub unused: [u32; 2],
+    pub viewport: [u32; 2],
+    pub first_pixel: u32,
+    pub first_cell: u32,
+    pub first_tile: u32,
+    pub slot: u32,
+    pub first_light: u32,
+    pub first_ambient: u32,
+    pub per_unit: f32,
+    pub unused: [u32; 21],
 }
 
 /// What a frame's rays need to know about its lights.
@@ -58,10 +67,16 @@ pub(super) struct LightLayout {
     pub environment: u32,
     /// What a sample may leave out: [`crate::fold::Plan::negligible`].
     pub negligible: f32,
+    /// Which part of the values and sources is the object's.
+    pub slot: u32,
+    /// Its first record.
+    pub first_light: u32,
+    /// Its first vector of what folded lights send.
+    pub first_ambient: u32,
 }
 
 impl ViewUniform {
-    /// A frame's rays at `offset` inside the pixels of `tile`, which then hold `rays` rays.
+    /// A frame's rays at `offset` inside the pixels of `tile`, which then hold `rays` rays and are drawn alone.
     pub fn new(
         frame: &Frame,
         diagonal: f32,
@@ -94,8 +109,22 @@ impl ViewUniform {
             share: 1.0,
             environment: lights.environment,
             negligible: lights.negligible,
-            unused: [0; 2],
+            viewport: tile.size,
+            first_pixel: 0,
+            first_cell: 0,
+            first_tile: 0,
+            slot: lights.slot,
+            first_light: lights.first_light,
+            first_ambient: lights.first_ambient,
+            per_unit: 1.0,
+            unused: [0; 21],
         }
+    }
+
+    /// The same among other tiles.
+    pub fn at(self, place: Place) -> Self {
+        let Place { first_pixel, first_cell, first_tile } = place;
+        Self { first_pixel, first_cell, first_tile, ..self }
     }
 }
 
@@ -233,15 +262,19 @@ mod tests {
             let Some((field, kind)) = line.split_once(':') else {
                 continue;
             };
-            let (align, size) = match kind.trim() {
+            let kind = kind.trim();
+            let (align, size) = match kind {
                 "vec3f" | "vec3u" => (16, 12),
                 "vec2f" | "vec2u" => (8, 8),
                 "f32" | "u32" => (4, 4),
+                "array<vec4u, 5>" => (16, 80),
                 other => panic!("{other}"),
             };
             at = at.next_multiple_of(align);
             align_all = align_all.max(align);
-            fields.push((field.trim().to_owned(), at));
+            if field.trim() != "unused" {
+                fields.push((field.trim().to_owned(), at));
+            }
             at += size;
         }
         (fields, at.next_multiple_of(align_all))
@@ -283,7 +316,15 @@ mod tests {
             first_scene_light,
             share,
             environment,
-            negligible
+            negligible,
+            viewport,
+            first_pixel,
+            first_cell,
+            first_tile,
+            slot,
+            first_light,
+            first_ambient,
+            per_unit
         );
         mirrors!(
             MediumUniform,

@@ -9,7 +9,11 @@ const BOUNDARY: u32 = 12u; // eight reflectances, highlight (rgb), unused
 
 @fragment
 fn reflect_at(in: Corner, @builtin(front_facing) entry: bool) {
+    view = views[in.object];
     let pixel = vec2u(in.position.xy);
+    if (any(pixel >= view.tile_size)) {
+        return;
+    }
     let index = pixel_index(pixel);
     let direction = ray_direction(pixel);
     let meeting = meet(in.triangle, entry, direction);
@@ -60,7 +64,7 @@ fn highlight(meeting: Meeting, geometric: vec3f, direction: vec3f) -> vec3f {
     }
     var sum = vec3f(0.0);
     for (var l = 0u; l < view.scene_lights; l++) {
-        let arriving = incident(lights[view.first_scene_light + l], point);
+        let arriving = incident(lights[view.first_light + view.first_scene_light + l], point);
         let cosine = dot(n, arriving.towards);
         if (cosine <= 0.0 || dot(geometric, arriving.towards) <= 0.0) {
             continue;

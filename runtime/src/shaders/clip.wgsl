@@ -1,22 +1,17 @@
 // Clip pass, only with a host's depth buffer: inside pieces end at what stands in front of their end.
-struct Clip {
-    per_unit: f32,      // the object's units of a world unit
-    width: u32,         // of the picture
-}
-
 @group(1) @binding(0) var<storage, read> distances: array<f32>; // world units
 @group(1) @binding(1) var<storage, read_write> pieces: array<vec4f>;
-@group(1) @binding(2) var<uniform> clip: Clip;
 
 const MAX_PIECES: u32 = 4u;
 
 @compute @workgroup_size(8, 8)
 fn cut_off(@builtin(global_invocation_id) pixel: vec3u) {
+    view = views[pixel.z];
     if (any(pixel.xy >= view.tile_size)) {
         return;
     }
     let place = view.tile_start + pixel.xy;
-    let limit = distances[place.y * clip.width + place.x] * clip.per_unit;
+    let limit = distances[place.y * view.width + place.x] * view.per_unit;
     let index = pixel_index(pixel.xy);
     let stride = arrayLength(&pieces) / MAX_PIECES;
     for (var k = 0u; k < MAX_PIECES; k++) {

@@ -6,6 +6,7 @@
 
 @compute @workgroup_size(8, 8)
 fn compose(@builtin(global_invocation_id) pixel: vec3u) {
+    view = views[0];
     if (any(pixel.xy >= view.tile_size)) {
         return;
     }

@@ -11,7 +11,7 @@
 // Position and sharpness of each sample, then a sphere around the kernels of each cluster of 64.
 @group(1) @binding(0) var<storage, read> samples: array<vec4f>;
 @group(1) @binding(1) var<storage, read> sources: array<vec4f>;  // SOURCE a sample: v, weight; slopes
-@group(1) @binding(2) var<storage, read> tiles: array<u32>;      // column and row of those with pixels inside, 16 bits each
+@group(1) @binding(2) var<storage, read> tiles: array<u32>;      // column, row (13 bits each) and object of those with pixels inside
 @group(1) @binding(3) var<storage, read> piece: array<vec4f>;
 @group(1) @binding(4) var<storage, read> profile: array<vec4f>;
 
@@ -86,7 +86,7 @@ fn sight(start: f32, end: f32) -> f32 {
 
 fn kernel_of(sample: u32) -> Kernel {
     let s = samples[sample];
-    let at = SOURCE * sample;
+    let at = SOURCE * (view.slot * medium.samples + sample);
     return Kernel(s.xyz - view.origin, s.w, sources[at],
         sources[at + 1u].xyz, sources[at + 2u].xyz, sources[at + 3u].xyz);
 }
@@ -172,9 +172,11 @@ fn list_marked(local: u32, before: u32, base: u32) {
     }
 }
 
-// The tile of a workgroup.
-fn tile_of(group: u32) -> vec2u {
-    return vec2u(tiles[group] & 0xffffu, tiles[group] >> 16u);
+// Column and row of a workgroup's tile, whose object is from now on at hand.
+fn pick_tile(group: u32) -> vec2u {
+    let listed_tile = tiles[group];
+    view = views[listed_tile >> 26u];
+    return vec2u(listed_tile & 0x1fffu, (listed_tile >> 13u) & 0x1fffu);
 }
 
 // One of 64 threads of a tile; `lane` of `lanes` that can talk.

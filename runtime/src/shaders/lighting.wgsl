@@ -1,4 +1,4 @@
-// Lighting pass: light scattered towards the camera by each sample, one thread a sample.
+// Lighting pass: light scattered towards the camera by each sample of each object, one thread each.
 //
 //   v = albedo * sum over lights of p(cos) E psi boundary,   psi = exp(-ratio * decode(SH)) or exp(-extinction * m)
 //
@@ -46,7 +46,7 @@ fn expanded(word: u32, bits: u32, unit: f32) -> f32 {
 }
 
 // Word of a code, and the code's first bit there: code `k` of a band, of codes that start at byte `start`.
-fn place(start: u32, band: Band, k: u32) -> vec2u {
+fn code_place(start: u32, band: Band, k: u32) -> vec2u {
     let at = 8u * (start & 3u) + band.before + k * band.bits;
     return vec2u((start >> 2u) + (at >> 5u), at & 31u);
 }
@@ -61,7 +61,7 @@ fn decode_depth(start: u32, order: u32, scale: f32) {
     for (var l = 0u; l < order; l++) {
         let band = bands[l];
         for (var k = 0u; k < 2u * l + 1u; k++) {
-            let at = place(start, band, k);
+            let at = code_place(start, band, k);
             let word = field(depth[at.x], depth[at.x + 1u], at.y);
             of_depth[l * l + k] = expanded(word, band.bits, scale * band.depth);
         }
@@ -72,7 +72,7 @@ fn decode_boundary(start: u32, scale: f32) {
     for (var l = 0u; l < BOUNDARY_ORDER; l++) {
         let band = bands[l];
         for (var k = 0u; k < 2u * l + 1u; k++) {
-            let at = place(start, band, k);
+            let at = code_place(start, band, k);
             let word = field(boundary[at.x], boundary[at.x + 1u], at.y);
             of_boundary[l * l + k] = expanded(word, band.bits, scale * band.boundary);
         }
@@ -159,13 +159,15 @@ fn largest(v: vec3f) -> f32 {
 
 @compute @workgroup_size(64)
 fn light_samples(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) groups: vec3u) {
+    view = views[id.z];
     let sample = id.y * groups.x * 64u + id.x;
     if (sample >= medium.samples) {
         return;
     }
+    let place = view.slot * medium.total + medium.first + sample;
     let weight = weights[sample];
     if (weight <= 0.0) {
-        values[medium.first + sample] = vec4f(0.0);
+        values[place] = vec4f(0.0);
         return;
     }
     let x = centroids[sample].xyz;
@@ -186,7 +188,7 @@ fn light_samples(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgrou
     var first = 0u;
     var sum = vec3f(0.0);
     if (view.light_count > PORTION) {
-        let earlier = values[medium.first + sample];
+        let earlier = values[place];
         first = u32(earlier.w);
         sum = earlier.xyz;
     }
@@ -199,7 +201,7 @@ fn light_samples(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgrou
     var brought: array<vec3f, 4>;
     var corrections: array<vec3f, 4>;
     for (var l = first; l < end; l++) {
-        let light = lights[l];
+        let light = lights[view.first_light + l];
         let arriving = incident(light, x);
         let g = clamp(medium.mean_cosine, -light.most_cosine, light.most_cosine);
         let phase = henyey_greenstein(g, -arriving.towards, towards_camera);
@@ -250,8 +252,8 @@ fn light_samples(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgrou
         }
     }
     if (end < view.light_count) {
-        values[medium.first + sample] = vec4f(sum, f32(end));
+        values[place] = vec4f(sum, f32(end));
         return;
     }
-    values[medium.first + sample] = vec4f(min(medium.albedo * sum, vec3f(most_source())), weight);
+    values[place] = vec4f(min(medium.albedo * sum, vec3f(most_source())), weight);
 }

@@ -104,7 +104,7 @@ fn sight_of(outline: Outline, low: f32, high: f32) -> Sight {
     for (var y = top.y; y <= bottom.y; y++) {
         for (var x = top.x; x <= bottom.x; x++) {
             for (var k = 0u; k < MAX_PIECES; k++) {
-                let range = cells[k * stride + y * columns + x];
+                let range = cells[k * stride + view.first_cell + y * columns + x];
                 if (range.x > range.y) {
                     // Pixels without this piece have none of the later ones.
                     break;
@@ -122,6 +122,7 @@ fn sight_of(outline: Outline, low: f32, high: f32) -> Sight {
 
 @compute @workgroup_size(64)
 fn outline(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) groups: vec3u) {
+    view = views[id.z];
     let index = id.y * groups.x * 64u + id.x;
     if (index >= medium.samples) {
         return;
@@ -130,7 +131,7 @@ fn outline(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) gr
     let centre = sample.xyz - view.origin;
     let radius = 1.0001 * CUT_OFF_RADIUS / sample.w;
     var sight = Sight(DARK, 0u);
-    if (sources[SOURCE * index].w > 0.0) {
+    if (sources[SOURCE * (view.slot * medium.samples + index)].w > 0.0) {
         sight.kind = OUTSIDE;
         if (dot(centre, view.forward) > -radius) {
             let unit = vec2f(length(view.right), length(view.up));

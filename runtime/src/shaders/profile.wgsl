@@ -8,6 +8,7 @@ const SUBSTEPS: u32 = 2u;
 
 @compute @workgroup_size(8, 8)
 fn march(@builtin(global_invocation_id) pixel: vec3u) {
+    view = views[pixel.z];
     if (any(pixel.xy >= view.tile_size)) {
         return;
     }

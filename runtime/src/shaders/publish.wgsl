@@ -10,6 +10,7 @@ fn whole(@builtin(vertex_index) corner: u32) -> @builtin(position) vec4f {
 
 @fragment
 fn mean(@builtin(position) position: vec4f) -> @location(0) vec4f {
+    view = views[0];
     let index = pixel_index(vec2u(position.xy) - view.tile_start);
     return vec4f(radiance[index].xyz, f32(counters[index].x)) / f32(view.rays);
 }

@@ -17,6 +17,7 @@ struct Sums {
 
 @compute @workgroup_size(8, 8)
 fn resolve(@builtin(global_invocation_id) pixel: vec3u) {
+    view = views[pixel.z];
     if (any(pixel.xy >= view.tile_size)) {
         return;
     }

@@ -7,7 +7,8 @@ const SLOTS: u32 = 8u;
 const STATE: u32 = 10u;
 const BOUNDARY: u32 = 12u;
 const MAX_PIECES: u32 = 4u;
-const ARGUMENTS: u32 = 8u;  // of a piece: dispatch over 8 x 8 pixels (3), unused, over listed tiles (3), unused
+const CELL: u32 = 8u;
+const ARGUMENTS: u32 = 8u;  // of a piece: dispatch over cells of 8 x 8 pixels (3), unused, over listed tiles (3), unused
 const OVER_TILES: u32 = 4u; // where the second begins
 const LISTS: u32 = 64u;     // where the lists of tiles of each piece begin; then come a mark for every tile and piece
 
@@ -49,11 +50,14 @@ fn segments(
         atomicStore(&cell_latest[local], 0u);
     }
     workgroupBarrier();
+    view = views[pixel.z];
     if (all(pixel.xy < view.tile_size)) {
-        cut(pixel_index(pixel.xy));
+        cut(pixel_index(pixel.xy), cell_count);
     }
     workgroupBarrier();
-    if (local < MAX_PIECES) {
+    let columns = (view.tile_size.x + CELL - 1u) / CELL;
+    // Cells beside the tile are those of larger tiles that are drawn together with it.
+    if (local < MAX_PIECES && all(cell.xy * CELL < view.tile_size)) {
         let stride = arrayLength(&cells) / MAX_PIECES;
         let start = atomicLoad(&cell_start[local]);
         var range = vec4f(1e30, -1.0, 0.0, 0.0);
@@ -61,27 +65,27 @@ fn segments(
             range = vec4f(bitcast<f32>(start), bitcast<f32>(atomicLoad(&cell_end[local])),
                 bitcast<f32>(atomicLoad(&cell_latest[local])), 0.0);
         }
-        cells[local * stride + cell.y * cell_count.x + cell.x] = range;
+        cells[local * stride + view.first_cell + cell.y * columns + cell.x] = range;
         if (range.x <= range.y) {
-            list_tile(local, cell.xy / 2u, (cell_count.x + 1u) / 2u);
+            list_tile(local, vec3u(cell.xy / 2u, cell.z), (columns + 1u) / 2u);
         }
     }
 }
 
-// Lists a tile of 16 x 16 pixels that have piece k, once.
-fn list_tile(k: u32, tile: vec2u, columns: u32) {
+// Lists a tile of 16 x 16 pixels of an object that have piece k, once.
+fn list_tile(k: u32, tile: vec3u, columns: u32) {
     let stride = (arrayLength(&arguments) - LISTS) / (2u * MAX_PIECES);
-    let mark = LISTS + (MAX_PIECES + k) * stride + tile.y * columns + tile.x;
+    let mark = LISTS + (MAX_PIECES + k) * stride + view.first_tile + tile.y * columns + tile.x;
     if (atomicExchange(&arguments[mark], 1u) == 0u) {
         let place = atomicAdd(&arguments[k * ARGUMENTS + OVER_TILES], 1u);
-        atomicStore(&arguments[LISTS + k * stride + place], tile.x | (tile.y << 16u));
+        atomicStore(&arguments[LISTS + k * stride + place], tile.x | (tile.y << 13u) | (tile.z << 26u));
         atomicMax(&arguments[k * ARGUMENTS + OVER_TILES + 1u], 1u);
         atomicMax(&arguments[k * ARGUMENTS + OVER_TILES + 2u], 1u);
     }
 }
 
-// The pieces of one pixel.
-fn cut(index: u32) {
+// The pieces of one pixel, and what is dispatched for them: as many groups as here.
+fn cut(index: u32, groups: vec3u) {
     let stride = arrayLength(&pieces) / MAX_PIECES;
     let state = index * STATE;
     var winding = bitcast<i32>(crossings[state + SLOTS]);
@@ -121,9 +125,8 @@ fn cut(index: u32) {
         if (k >= count) {
             pieces[k * stride + index] = vec4f(0.0);
         } else if (atomicLoad(&arguments[k * ARGUMENTS]) == 0u) {
-            let groups = (view.tile_size + vec2u(7u)) / 8u;
             atomicMax(&arguments[k * ARGUMENTS + 1u], groups.y);
-            atomicMax(&arguments[k * ARGUMENTS + 2u], 1u);
+            atomicMax(&arguments[k * ARGUMENTS + 2u], groups.z);
             atomicMax(&arguments[k * ARGUMENTS], groups.x);
         }
     }

@@ -16,11 +16,14 @@ const MOST_EXPONENT: f32 = 4.0;
 
 @compute @workgroup_size(64)
 fn find_slopes(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) groups: vec3u) {
+    view = views[id.z];
     let sample = id.y * groups.x * 64u + id.x;
     if (sample >= medium.samples) {
         return;
     }
-    let own = values[medium.first + sample];
+    let object = view.slot * medium.total;
+    let own = values[object + medium.first + sample];
+    let place = SOURCE * (view.slot * medium.samples + sample);
     let centroid = centroids[sample];
     let kernel = samples[sample];
     let to_centre = kernel.xyz - centroid.xyz;
@@ -33,7 +36,7 @@ fn find_slopes(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups
         if (own[c] > 0.0) {
             for (var k = 0u; k < NEIGHBOURS; k++) {
                 let spoke = spokes[sample * NEIGHBOURS + k];
-                let ratio = values[bitcast<u32>(spoke.w)][c] / own[c];
+                let ratio = values[object + bitcast<u32>(spoke.w)][c] / own[c];
                 var logarithm = -MOST_RATIO;
                 if (ratio > 0.0) {
                     logarithm = clamp(log(ratio), -MOST_RATIO, MOST_RATIO);
@@ -48,7 +51,7 @@ fn find_slopes(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups
             let spread = max(variance * dot(slope, slope) - along * along, 0.0);
             value[c] *= exp(clamp(along - 0.5 * means[c] * spread, -MOST_EXPONENT, MOST_EXPONENT));
         }
-        sources[SOURCE * sample + 1u + c] = vec4f(slope, 0.0);
+        sources[place + 1u + c] = vec4f(slope, 0.0);
     }
-    sources[SOURCE * sample] = vec4f(value, own.w);
+    sources[place] = vec4f(value, own.w);
 }

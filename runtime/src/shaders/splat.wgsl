@@ -50,6 +50,7 @@ const HEXAGON = array<vec2f, 6>(
 // Vertex 6 k + c is corner c of the k-th sample of its instance.
 @vertex
 fn outline(@builtin(vertex_index) vertex: u32, @builtin(instance_index) instance: u32) -> Splat {
+    view = views[0];
     let index = BATCH * batches[instance] + vertex / 6u;
     if (index >= medium.samples || shown[index] == 0u) {
         return Splat(vec4f(2.0, 2.0, 0.0, 1.0), vec4f(0.0), vec4f(0.0), vec3f(0.0), vec3f(0.0), vec3f(0.0));
@@ -66,13 +67,14 @@ fn outline(@builtin(vertex_index) vertex: u32, @builtin(instance_index) instance
     var position = tile_clip(shape.middle + shape.first * at.x + shape.second * at.y, 1.0);
     position.z = 0.0;
     let sample = samples[index];
-    let slopes = SOURCE * index + 1u;
+    let slopes = SOURCE * (view.slot * medium.samples + index) + 1u;
     return Splat(position, vec4f(sample.xyz - view.origin, sample.w), sources[slopes - 1u],
         sources[slopes].xyz, sources[slopes + 1u].xyz, sources[slopes + 2u].xyz);
 }
 
 @fragment
 fn add(in: Splat) -> Sums {
+    view = views[0];
     let pixel = vec2u(in.position.xy);
     let index = pixel_index(pixel);
     let whole = piece[index].xy;

@@ -19,6 +19,7 @@ const STATE: u32 = 10u; // slots, sum of signs (+1 exit, -1 entry), number of cr
 struct Corner {
     @invariant @builtin(position) position: vec4f,
     @location(0) @interpolate(flat) triangle: u32,
+    @location(1) @interpolate(flat) object: u32,
 }
 
 fn corner_position(corner: u32) -> vec3f {
@@ -28,12 +29,17 @@ fn corner_position(corner: u32) -> vec3f {
 
 // Vertex i begins triangle i, and flat values are those of a triangle's first vertex.
 @vertex
-fn corner(@builtin(vertex_index) triangle: u32, @location(0) position: vec3f) -> Corner {
+fn corner(
+    @builtin(vertex_index) triangle: u32,
+    @builtin(instance_index) object: u32,
+    @location(0) position: vec3f,
+) -> Corner {
+    view = views[object];
     let q = position - view.origin;
     let plane = vec2f(
         dot(q, view.right) / dot(view.right, view.right),
         dot(q, view.up) / dot(view.up, view.up));
-    return Corner(tile_clip(plane, dot(q, view.forward)), triangle);
+    return Corner(tile_clip(plane, dot(q, view.forward)), triangle, object);
 }
 
 // x without its lower 12 bits: products of two such numbers are exact.
@@ -112,7 +118,11 @@ fn crossing_key(t: f32, entry: bool) -> u32 {
 
 @fragment
 fn insert(in: Corner, @builtin(front_facing) entry: bool) {
+    view = views[in.object];
     let pixel = vec2u(in.position.xy);
+    if (any(pixel >= view.tile_size)) {
+        return;
+    }
     let state = pixel_index(pixel) * STATE;
     var key = crossing_key(meet(in.triangle, entry, ray_direction(pixel)).t, entry);
     for (var slot = 0u; slot < SLOTS && key != 0u; slot++) {

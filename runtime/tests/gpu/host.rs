@@ -283,10 +283,10 @@ fn nothing_is_done_twice_and_nothing_out_of_sight() {
     host.put(&asset, Placement { translation: behind, ..Placement::IDENTITY });
     let first = host.draw(&host_frame(&scene, None));
     let samples = asset.samples.len() as u64;
-    let all = HostReport { drawn: 1, culled: 1, lit: 1, tiles: 1, fading: 0, samples, reused: false };
+    let all = HostReport { drawn: 1, culled: 1, lit: 1, tiles: 1, draws: 1, fading: 0, samples, reused: false };
     assert_eq!(host.renderer.report(), all);
     assert_eq!(host.draw(&host_frame(&scene, None)), first);
-    assert_eq!(host.renderer.report(), HostReport { lit: 0, tiles: 0, samples: 0, reused: true, ..all });
+    assert_eq!(host.renderer.report(), HostReport { lit: 0, tiles: 0, draws: 0, samples: 0, reused: true, ..all });
     scene.camera.position.x += 0.1;
     host.draw(&host_frame(&scene, None));
     assert_eq!(host.renderer.report(), HostReport { lit: 0, ..all });

@@ -72,6 +72,8 @@ pub struct HostReport {
     pub lit: usize,
     /// Tiles of all objects.
     pub tiles: usize,
+    /// How often the passes ran for them: small objects of a kind are drawn together.
+    pub draws: usize,
     /// Samples of the levels that were drawn.
     pub samples: u64,
     /// Whether the last picture still holds, so that nothing was recorded.

@@ -38,6 +38,6 @@ impl Fold {
     }
 
     pub fn record(&self, r: &mut Recorder, groups: &[BindGroup], asset: &AssetBuffers) {
-        r.over_samples(Pass::Fold, &self.pipeline, groups, &asset.shards, 1);
+        r.over_samples(Pass::Fold, &self.pipeline, groups, &asset.shards);
     }
 }

@@ -2,7 +2,8 @@
 
 use super::super::asset::AssetBuffers;
 use super::super::bindings::{Slot, compute, group, layout, pipeline_layout};
-use super::super::frame::FrameBuffers;
+use super::super::asset::VALUE;
+use super::super::frame::{FrameBuffers, Lit};
 use super::super::shaders;
 use super::super::shard::Shard;
 use super::super::timers::Pass;
@@ -57,12 +58,20 @@ impl Lighting {
         group(device, "lighting", &self.layout, resources.map(|b| b.as_entire_binding()).into())
     }
 
-    /// For so many lights.
-    pub fn record(&self, r: &mut Recorder, groups: &[BindGroup], asset: &AssetBuffers, lights: usize) {
-        let portions = lights.div_ceil(PORTION).max(1);
-        if portions > 1 {
-            r.encoder.clear_buffer(&asset.values, 0, None);
+    /// For objects with so many lights each, the most first.
+    pub fn record(&self, r: &mut Recorder, groups: &[BindGroup], asset: &AssetBuffers, lit: &[Lit]) {
+        let portions = |o: &Lit| o.lights.div_ceil(PORTION).max(1);
+        let bytes = VALUE * u64::from(asset.sample_count);
+        for object in lit.iter().filter(|o| portions(o) > 1) {
+            r.encoder.clear_buffer(&asset.values, bytes * object.slot as u64, Some(bytes));
         }
-        r.over_samples(Pass::Lighting, &self.pipeline, groups, &asset.shards, portions as u32);
+        let rounds = lit.first().map_or(1, portions);
+        r.over_shards(Pass::Lighting, &self.pipeline, groups, |pass, k| {
+            let [columns, rows] = asset.shards[k].sample_groups();
+            for round in 0..rounds {
+                let count = lit.iter().filter(|o| portions(o) > round).count();
+                pass.dispatch_workgroups(columns, rows, count as u32);
+            }
+        });
     }
 }

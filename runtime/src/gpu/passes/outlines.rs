@@ -47,6 +47,6 @@ impl Outlines {
         for shard in &asset.shards {
             r.encoder.clear_buffer(&shard.batches, 0, None);
         }
-        r.over_samples(Pass::Outlines, &self.pipeline, groups, &asset.shards, 1);
+        r.over_samples(Pass::Outlines, &self.pipeline, groups, &asset.shards);
     }
 }

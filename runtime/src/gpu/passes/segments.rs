@@ -44,7 +44,7 @@ impl Segments {
 
     pub fn record(&self, r: &mut Recorder, group: &BindGroup, targets: &Targets) {
         r.encoder.clear_buffer(&targets.arguments, 0, None);
-        let [x, y] = r.pixel_groups();
-        r.compute(Pass::Segments, &self.pipeline, group, |pass| pass.dispatch_workgroups(x, y, 1));
+        let [x, y, z] = r.pixel_groups();
+        r.compute(Pass::Segments, &self.pipeline, group, |pass| pass.dispatch_workgroups(x, y, z));
     }
 }

@@ -31,6 +31,6 @@ impl Slopes {
     }
 
     pub fn record(&self, r: &mut Recorder, groups: &[BindGroup], asset: &AssetBuffers) {
-        r.over_samples(Pass::Slopes, &self.pipeline, groups, &asset.shards, 1);
+        r.over_samples(Pass::Slopes, &self.pipeline, groups, &asset.shards);
     }
 }

@@ -100,7 +100,7 @@ impl Splat {
         group(device, "splat", &self.layout, resources)
     }
 
-    /// Only clears where no pixel has this piece.
+    /// Only clears where no pixel has this piece. For one tile: quads are blended where their pixels are.
     pub fn record(
         &self,
         r: &mut Recorder,
@@ -118,7 +118,7 @@ impl Splat {
             multiview_mask: None,
         });
         render.set_pipeline(&self.pipeline);
-        Recorder::aim(r.common, r.view_offset, r.tile, &mut render);
+        Recorder::aim(r.common, r.view_offset, r.lot.size, &mut render);
         render.set_index_buffer(self.indices.slice(..), IndexFormat::Uint16);
         for ((shard, common), group) in asset.shards.iter().zip(r.common).zip(groups) {
             render.set_bind_group(0, common, &[r.view_offset]);

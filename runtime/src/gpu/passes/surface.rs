@@ -46,7 +46,7 @@ impl Surface {
 }
 
 /// A pipeline that draws every triangle from both sides and writes no attachment. The pass needs one none the less,
-/// because its size is the tile's.
+/// because its size is the largest tile's.
 pub(super) fn mesh_pipeline(
     device: &Device,
     label: &str,
@@ -94,7 +94,7 @@ pub(super) fn mesh_pipeline(
     })
 }
 
-/// Draws the whole mesh.
+/// Draws the whole mesh of every object.
 pub(super) fn draw_mesh(
     r: &mut Recorder,
     pass: Pass,
@@ -117,9 +117,9 @@ pub(super) fn draw_mesh(
         multiview_mask: None,
     });
     render.set_pipeline(pipeline);
-    Recorder::aim(r.common, r.view_offset, r.tile, &mut render);
+    Recorder::aim(r.common, r.view_offset, r.lot.size, &mut render);
     render.set_bind_group(1, group, &[]);
     render.set_vertex_buffer(0, asset.corners.slice(..));
     render.set_index_buffer(asset.indices.slice(..), IndexFormat::Uint32);
-    render.draw_indexed(0..3 * asset.triangle_count, 0, 0..1);
+    render.draw_indexed(0..3 * asset.triangle_count, 0, 0..r.lot.count);
 }

@@ -9,6 +9,7 @@ use crate::frame::Frame;
 use crate::gpu::bindings::{Slot, compute, empty_buffer, filled_buffer, group, layout, pipeline_layout};
 use crate::gpu::device::GpuDevice;
 use crate::gpu::frame::{VIEW_STRIDE, common_layout};
+use crate::gpu::lot::MOST_VIEWS;
 use crate::gpu::tiles::Tile;
 use crate::gpu::uniforms::{LightLayout, LightRecord, MediumUniform, ViewUniform};
 use crate::gpu::{readback, shaders};
@@ -205,9 +206,13 @@ impl Stage {
             means: 1.0,
             environment: 0,
             negligible: 0.0,
+            slot: 0,
+            first_light: 0,
+            first_ambient: 0,
         };
-        let view = ViewUniform::new(frame, self.diagonal, tile, [0.5; 2], 1, lights);
-        let view = filled_buffer(device, "view", &[view], BufferUsages::UNIFORM);
+        let mut views = [ViewUniform::zeroed(); MOST_VIEWS];
+        views[0] = ViewUniform::new(frame, self.diagonal, tile, [0.5; 2], 1, lights);
+        let view = filled_buffer(device, "view", &views, BufferUsages::UNIFORM);
         let resources = vec![view.as_entire_binding(), self.medium.as_entire_binding()];
         group(device, "common", &self.common, resources)
     }

@@ -7,6 +7,7 @@ const ROW: u32 = 65536u;    // threads of a row of workgroups
 
 @compute @workgroup_size(64)
 fn fill(@builtin(global_invocation_id) id: vec3u) {
+    view = views[0];
     let number = settings.first + id.y * ROW + id.x;
     if (number >= settings.end) {
         return;

@@ -120,6 +120,7 @@ fn looked_up(place: vec3f) -> vec4f {
 
 @compute @workgroup_size(8, 8)
 fn march(@builtin(global_invocation_id) id: vec3u) {
+    view = views[0];
     let pixel = vec2u(id.x, settings.first + id.y);
     if (pixel.x >= view.width || pixel.y >= settings.end) {
         return;

@@ -1,4 +1,4 @@
-// Camera, tile and frame parameters: mirrors `ViewUniform` in gpu/uniforms.rs.
+// Camera, tile and frame parameters of one object: mirrors `ViewUniform` in gpu/uniforms.rs.
 struct View {
     origin: vec3f,          // centre of projection, relative to the asset's centre
     width: u32,             // of the whole picture, pixels
@@ -22,9 +22,24 @@ struct View {
     share: f32,             // of a level of detail in an object that fades into the next; below 0: more of it follows
     environment: u32,       // lights in front that stand for an environment
     negligible: f32,        // what a sample may leave out of a portion of lights, as a part of what it has; 0: nothing
+    viewport: vec2u,        // columns and rows of the largest tile that is drawn together with this one
+    first_pixel: u32,       // of the tile, where all tiles drawn together keep their pixels
+    first_cell: u32,        // the same of its squares of 8 x 8 pixels
+    first_tile: u32,        // and of 16 x 16
+    slot: u32,              // of the object among those with the same samples: which part of their values and sources it has
+    first_light: u32,       // of its lights among those of all
+    first_ambient: u32,     // of what its folded lights send, likewise
+    per_unit: f32,          // the object's units of a world unit
+    unused: array<vec4u, 5>,
 }
 
-@group(0) @binding(0) var<uniform> view: View;
+// Objects that are drawn together at the most.
+const MOST_VIEWS: u32 = 64u;
+
+@group(0) @binding(0) var<uniform> views: array<View, MOST_VIEWS>;
+
+// The object at hand: every entry point picks it first.
+var<private> view: View;
 
 // Unit direction of the ray through `pixel` of the tile.
 fn ray_direction(pixel: vec2u) -> vec3f {
@@ -38,14 +53,14 @@ fn ray_direction(pixel: vec2u) -> vec3f {
 
 // Where a pixel keeps its state.
 fn pixel_index(pixel: vec2u) -> u32 {
-    return pixel.y * view.tile_size.x + pixel.x;
+    return view.first_pixel + pixel.y * view.tile_size.x + pixel.x;
 }
 
-// Clip coordinates in the tile, such that the ray of this pass through a pixel meets the pixel's centre.
+// Clip coordinates in the viewport, whose first pixels are the tile's, such that the ray of this pass through a pixel meets the pixel's centre.
 // `plane` holds the coordinates along `right` and `up` of a point at distance `depth` along `forward`.
 // The constant z puts the near plane at w = near and the far plane nowhere.
 fn tile_clip(plane: vec2f, depth: f32) -> vec4f {
-    let size = vec2f(view.tile_size);
+    let size = vec2f(view.viewport);
     let full = vec2f(f32(view.width), f32(view.height));
     let shift = (vec2f(0.5) - view.offset) - vec2f(view.tile_start);
     let column = (plane.x + depth) * 0.5 * full.x + shift.x * depth;

@@ -1,0 +1,90 @@
+//! Tiles that are drawn together: one dispatch or draw of every pass for all of them, whose state lies one behind the other in the
+//! same buffers. What takes a GPU long about small objects is not their pixels but the passes, one after the other.
+
+use super::tiles::Tile;
+
+/// Tiles of one lot at the most; `MOST_VIEWS` of view.wgsl.
+pub(super) const MOST_VIEWS: usize = 64;
+
+/// How much state some tiles have together.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Lot {
+    /// Columns and rows of a tile that covers each of them.
+    pub size: [u32; 2],
+    /// How many.
+    pub count: u32,
+    /// Their pixels.
+    pub pixels: u64,
+    /// Their squares of 8 × 8 pixels.
+    pub cells: u64,
+    /// And of 16 × 16.
+    pub tiles: u64,
+}
+
+/// Where a tile's state begins.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Place {
+    pub first_pixel: u32,
+    pub first_cell: u32,
+    pub first_tile: u32,
+}
+
+impl Lot {
+    /// Adds a tile, and says where it is.
+    pub fn add(&mut self, tile: Tile) -> Place {
+        let place = Place {
+            first_pixel: self.pixels as u32,
+            first_cell: self.cells as u32,
+            first_tile: self.tiles as u32,
+        };
+        let squares = |side: u32| tile.size.iter().map(|n| u64::from(n.div_ceil(side))).product::<u64>();
+        self.size = [0, 1].map(|c| self.size[c].max(tile.size[c]));
+        self.count += 1;
+        self.pixels += tile.pixels();
+        self.cells += squares(8);
+        self.tiles += squares(16);
+        place
+    }
+
+    /// Enough for either.
+    pub fn or(self, other: Self) -> Self {
+        Self {
+            size: [0, 1].map(|c| self.size[c].max(other.size[c])),
+            count: self.count.max(other.count),
+            pixels: self.pixels.max(other.pixels),
+            cells: self.cells.max(other.cells),
+            tiles: self.tiles.max(other.tiles),
+        }
+    }
+
+    /// Whether what is made for it is enough for another.
+    pub fn holds(self, other: Self) -> bool {
+        Self { count: 0, ..self.or(other) } == Self { count: 0, ..self }
+    }
+}
+
+impl From<Tile> for Lot {
+    fn from(tile: Tile) -> Self {
+        let mut lot = Self::default();
+        lot.add(tile);
+        lot
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tiles_lie_one_behind_the_other() {
+        let mut lot = Lot::default();
+        let sizes = [[17, 9], [3, 40], [8, 8]];
+        let places = sizes.map(|size| lot.add(Tile { start: [5, 6], size }));
+        assert_eq!(places[0], Place::default());
+        assert_eq!(places[1], Place { first_pixel: 153, first_cell: 6, first_tile: 2 });
+        assert_eq!(places[2], Place { first_pixel: 273, first_cell: 11, first_tile: 5 });
+        assert_eq!(lot, Lot { size: [17, 40], count: 3, pixels: 337, cells: 12, tiles: 6 });
+        assert!(lot.holds(Tile { start: [0; 2], size: [17, 9] }.into()));
+        assert!(!lot.holds(Tile { start: [0; 2], size: [18, 1] }.into()));
+    }
+}
