@@ -20,7 +20,7 @@ use half::f16;
 const SIZE: [u32; 2] = [112, 96];
 pub const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba16Float;
 
-fn projection(camera: &Camera) -> Mat4 {
+pub fn projection(camera: &Camera) -> Mat4 {
     let fov = camera.vertical_fov_degrees.to_radians() as f32;
     camera::rh::proj::directx::perspective_infinite_reverse(fov, SIZE[0] as f32 / SIZE[1] as f32, 0.1)
 }
@@ -43,7 +43,7 @@ pub fn host_frame<'a>(scene: &'a Scene, depth: Option<HostDepth<'a>>) -> HostFra
 }
 
 /// A device and queue, or `None` after saying why.
-fn device() -> Option<GpuDevice> {
+pub fn device() -> Option<GpuDevice> {
     gpu(&ball().build()).map(|_| GpuDevice::open(&instance(), None).unwrap())
 }
 
@@ -63,10 +63,10 @@ pub fn texture(device: &wgpu::Device, format: wgpu::TextureFormat) -> wgpu::Text
 }
 
 /// A host with one target that starts as an even colour.
-struct Host {
+pub struct Host {
     device: wgpu::Device,
     queue: wgpu::Queue,
-    renderer: Renderer,
+    pub renderer: Renderer,
     background: f64,
 }
 
@@ -75,7 +75,7 @@ impl Host {
         Self::with(device, queue, Options::new(FORMAT))
     }
 
-    fn with(device: wgpu::Device, queue: wgpu::Queue, options: Options) -> Self {
+    pub fn with(device: wgpu::Device, queue: wgpu::Queue, options: Options) -> Self {
         let renderer = Renderer::new(&device, options).unwrap();
         Self { device, queue, renderer, background: 0.0 }
     }
@@ -86,7 +86,7 @@ impl Host {
     }
 
     /// Colours and alpha, row by row.
-    fn draw(&mut self, frame: &HostFrame<'_>) -> Vec<[f32; 4]> {
+    pub fn draw(&mut self, frame: &HostFrame<'_>) -> Vec<[f32; 4]> {
         let target = texture(&self.device, FORMAT);
         let view = target.create_view(&Default::default());
         let mut encoder = self.device.create_command_encoder(&Default::default());
@@ -101,7 +101,7 @@ impl Host {
     }
 }
 
-fn clear(
+pub fn clear(
     encoder: &mut wgpu::CommandEncoder,
     colour: Option<(&wgpu::TextureView, wgpu::Color)>,
     depth: Option<(&wgpu::TextureView, f32)>,
@@ -132,7 +132,7 @@ fn largest_difference(a: &[[f32; 4]], b: &[[f32; 3]]) -> f32 {
     a.iter().zip(b).map(off).fold(0.0, f32::max)
 }
 
-fn peak(a: &[[f32; 4]]) -> f32 {
+pub fn peak(a: &[[f32; 4]]) -> f32 {
     a.iter().flat_map(|p| &p[..3]).fold(0.0, |m, v| m.max(*v))
 }
 

@@ -9,6 +9,7 @@ mod host;
 mod objects;
 mod scenes;
 mod shards;
+mod together;
 
 use diaphane_formats::asset::Asset;
 use diaphane_formats::encoding::Encoding;
