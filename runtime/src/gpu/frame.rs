@@ -372,7 +372,7 @@ fn views_size(views: usize) -> u64 {
 }
 
 /// Most bytes of a buffer that a shader sees.
-fn most_bound(device: &Device) -> u64 {
+pub(super) fn most_bound(device: &Device) -> u64 {
     let limits = device.limits();
     limits.max_storage_buffer_binding_size.min(limits.max_buffer_size)
 }

@@ -27,6 +27,7 @@ pub struct GpuRenderer {
     timers: Timers,
     name: String,
     tiles: usize,
+    slices: u32,
 }
 
 impl GpuRenderer {
@@ -49,7 +50,7 @@ impl GpuRenderer {
         owned.check()?;
         let timers = Timers::new(&owned.device, &owned.queue, 1);
         let name = owned.describe();
-        Ok(Self { owned, renderer, timers, name, tiles: 0 })
+        Ok(Self { owned, renderer, timers, name, tiles: 0, slices: 1 })
     }
 
     /// The adapter's name, backend, and whether it is software.
@@ -72,6 +73,12 @@ impl GpuRenderer {
         self.renderer.path()
     }
 
+    /// Has several workgroups share a square of 16 × 16 pixels where there are fewer squares than this, a slice of the samples
+    /// each. At first as suits the adapter: 1,024, or 0 (never) on a software adapter; without effect on quads.
+    pub fn set_workgroups(&mut self, workgroups: u32) {
+        self.renderer.set_workgroups(&self.owned.device, workgroups);
+    }
+
     /// Bounds the memory that the state of a picture's pixels takes on the adapter, 512 MiB at first; pictures that
     /// need more are drawn in tiles.
     pub fn limit_memory(&mut self, bytes: u64) {
@@ -81,6 +88,12 @@ impl GpuRenderer {
     /// Tiles that the last picture was drawn in; more than one where it was too large for the adapter's buffers.
     pub fn tiles(&self) -> usize {
         self.tiles
+    }
+
+    /// Slices that the samples of the last picture were cut into, each summed by workgroups of its own: see
+    /// [`Self::set_workgroups`].
+    pub fn slices(&self) -> u32 {
+        self.slices
     }
 
     /// Parts that the samples are cut into; more than one where they are too many for the adapter's bindings.
@@ -225,6 +238,7 @@ impl GpuRenderer {
         let area = covered_squares(frame, &self.renderer.asset.info).unwrap_or([[0; 2], [1; 2]]);
         let tiles = self.renderer.begin(device, queue, frame, exact, area)?;
         self.tiles = tiles.len();
+        self.slices = self.renderer.largest(&tiles).slices;
         let submissions = offsets.len() as u64 + 1;
         if self.timers.capacity() < submissions {
             self.timers = Timers::new(device, queue, submissions);

@@ -390,7 +390,8 @@ impl Renderer {
         let together = arrange(&tiles, most);
         // At least a pixel where nothing is in sight.
         let least = Lot::from(Tile { start: [0; 2], size: [1; 2] });
-        let needed = together.iter().map(Together::lot).fold(least, Lot::or);
+        let cut = |t: &Together<PoolId>| self.pipeline(t.kind).map_or(t.lot(), |p| p.cut(t.lot()));
+        let needed = together.iter().map(cut).fold(least, Lot::or);
         let targets = self.fit_targets(device, needed, state)?;
         for pool in pools_of(parts.iter().map(|p| p.pool)) {
             let objects: Vec<Object> = parts

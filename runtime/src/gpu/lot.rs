@@ -7,7 +7,7 @@ use super::tiles::Tile;
 pub(super) const MOST_VIEWS: usize = 64;
 
 /// How much state some tiles have together.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Lot {
     /// Columns and rows of a tile that covers each of them.
     pub size: [u32; 2],
@@ -19,6 +19,10 @@ pub(super) struct Lot {
     pub cells: u64,
     /// And of 16 × 16.
     pub tiles: u64,
+    /// That the samples are cut into, each of which sums for itself.
+    pub slices: u32,
+    /// Sums that are kept of all pixels: from shard to shard, and of every slice.
+    pub sums: u64,
 }
 
 /// Where a tile's state begins.
@@ -27,6 +31,13 @@ pub(super) struct Place {
     pub first_pixel: u32,
     pub first_cell: u32,
     pub first_tile: u32,
+}
+
+impl Default for Lot {
+    /// Nothing.
+    fn default() -> Self {
+        Self { size: [0; 2], count: 0, pixels: 0, cells: 0, tiles: 0, slices: 1, sums: 0 }
+    }
 }
 
 impl Lot {
@@ -54,14 +65,34 @@ impl Lot {
             pixels: self.pixels.max(other.pixels),
             cells: self.cells.max(other.cells),
             tiles: self.tiles.max(other.tiles),
+            slices: self.slices.max(other.slices),
+            sums: self.sums.max(other.sums),
         }
     }
 
     /// Whether what is made for it is enough for another.
     pub fn holds(self, other: Self) -> bool {
-        Self { count: 0, ..self.or(other) } == Self { count: 0, ..self }
+        let size = |lot: Self| Self { count: 0, slices: 1, ..lot };
+        size(self.or(other)) == size(self)
+    }
+
+    /// Cut into as many slices as make `wanted` workgroups of its tiles, where there are `clusters` of samples and at most so many
+    /// sums can be kept.
+    pub fn sliced(self, wanted: u32, clusters: u32, most_sums: u64) -> Self {
+        let most = u64::from(clusters / LEAST_CLUSTERS).min(most_sums / self.pixels.max(1));
+        let slices = (u64::from(wanted) / self.tiles.max(1)).min(most).max(1) as u32;
+        let sums = if slices > 1 { self.pixels * u64::from(slices) } else { self.sums };
+        Self { slices, sums, ..self }
+    }
+
+    /// The same where samples are several shards.
+    pub fn kept(self) -> Self {
+        Self { sums: self.pixels * u64::from(self.slices), ..self }
     }
 }
+
+/// Clusters of samples of a slice at the least.
+const LEAST_CLUSTERS: u32 = 2;
 
 impl From<Tile> for Lot {
     fn from(tile: Tile) -> Self {
@@ -83,8 +114,19 @@ mod tests {
         assert_eq!(places[0], Place::default());
         assert_eq!(places[1], Place { first_pixel: 153, first_cell: 6, first_tile: 2 });
         assert_eq!(places[2], Place { first_pixel: 273, first_cell: 11, first_tile: 5 });
-        assert_eq!(lot, Lot { size: [17, 40], count: 3, pixels: 337, cells: 12, tiles: 6 });
+        assert_eq!(lot, Lot { size: [17, 40], count: 3, pixels: 337, cells: 12, tiles: 6, ..Lot::default() });
         assert!(lot.holds(Tile { start: [0; 2], size: [17, 9] }.into()));
         assert!(!lot.holds(Tile { start: [0; 2], size: [18, 1] }.into()));
+    }
+
+    #[test]
+    fn few_tiles_are_cut_into_slices() {
+        let lot = Lot::from(Tile { start: [0; 2], size: [45, 45] });
+        let sliced = |wanted, clusters| lot.sliced(wanted, clusters, 1 << 20);
+        let slices = |wanted, clusters| sliced(wanted, clusters).slices;
+        assert_eq!([slices(0, 100), slices(9, 100), slices(1024, 100), slices(1024, 3)], [1, 1, 50, 1]);
+        assert_eq!((sliced(90, 100).sums, sliced(9, 100).sums, lot.kept().sums), (20250, 0, 2025));
+        assert!(!lot.holds(sliced(90, 100)) && sliced(90, 100).holds(lot.kept()));
+        assert_eq!(lot.sliced(1024, 100, 10_000).slices, 4);
     }
 }

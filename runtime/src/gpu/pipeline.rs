@@ -1,7 +1,7 @@
 //! The passes of a frame with everything that they read and write.
 
 use super::asset::AssetBuffers;
-use super::frame::{FrameBuffers, Lit, Object, VIEW_STRIDE, common_layout};
+use super::frame::{FrameBuffers, Lit, Object, VIEW_STRIDE, common_layout, most_bound};
 use super::lot::Lot;
 use super::passes::Recorder;
 use super::passes::batches::Batches;
@@ -14,10 +14,10 @@ use super::passes::profile::Profile;
 use super::passes::segments::Segments;
 use super::passes::slopes::Slopes;
 use super::passes::surface::Surface;
-use super::shard::Shard;
+use super::shard::{BATCH, Shard};
 pub(super) use super::splatting::SplatPath;
-use super::splatting::Splatting;
-use super::targets::{COUNTERS, LEAST, RADIANCE, TOTAL, Targets, budget};
+use super::splatting::{Splatting, SumGroups};
+use super::targets::{COUNTERS, KEPT, LEAST, RADIANCE, TOTAL, Targets, budget};
 use super::tiles::{Tile, split};
 use super::timers::Timers;
 use super::uniforms::ViewUniform;
@@ -42,6 +42,10 @@ pub(super) struct Pipeline {
     outlines: Outlines,
     batches: Batches,
     splatting: Splatting,
+    /// See [`SplatPath::workgroups`].
+    workgroups: u32,
+    /// That a binding holds.
+    most_sums: u64,
     pub(super) asset: AssetBuffers,
     frame: FrameBuffers,
     /// Whether later frames may keep the sources of an earlier one.
@@ -88,8 +92,7 @@ struct Groups {
 
 struct PieceGroups {
     profile: Option<BindGroup>,
-    splat: Vec<BindGroup>,
-    resolve: Option<BindGroup>,
+    sums: SumGroups,
 }
 
 impl Pipeline {
@@ -99,6 +102,7 @@ impl Pipeline {
     /// An asset that makes no sense or is too large for the device.
     pub fn new(device: &Device, asset: &Asset, path: SplatPath) -> Result<Self> {
         let path = path.checked(device)?;
+        let workgroups = path.workgroups(device);
         let common = common_layout(device);
         let asset = AssetBuffers::allocate(device, asset, path)?;
         Ok(Self {
@@ -111,7 +115,9 @@ impl Pipeline {
             profile: asset.heterogeneous.then(|| Profile::new(device, &common)),
             outlines: Outlines::new(device, &common, path),
             batches: Batches::new(device, &common, path),
-            splatting: Splatting::new(device, &common, &asset, path),
+            splatting: Splatting::new(device, &common, &asset, path, workgroups > 0),
+            workgroups,
+            most_sums: most_bound(device) / KEPT,
             frame: FrameBuffers::new(device, &common, &asset),
             common,
             asset,
@@ -163,13 +169,11 @@ impl Pipeline {
     ) -> Result<Vec<Tile>> {
         self.light(device, queue, &[Object { slot: 0, frame, exact }])?;
         let mut tiles = self.split(device, area)?;
-        // The first tile is the largest; `split` returns at least one.
-        let lot = Lot::from(tiles[0]);
-        let fits = self.targets.as_ref().is_some_and(|(t, _)| t.lot.holds(lot));
+        let fits = self.targets.as_ref().is_some_and(|(t, _)| t.lot.holds(self.largest(&tiles)));
         if !fits || self.frame.take_changed() {
             let mut old = self.targets.take().map(|(t, _)| t).filter(|_| fits);
             let targets = loop {
-                let made = old.take().map_or_else(|| self.allocate(device, tiles[0]), Ok);
+                let made = old.take().map_or_else(|| self.allocate(device, &tiles), Ok);
                 match made {
                     Err(Error::GpuMemory(what)) if self.shrink(&what) => tiles = self.split(device, area)?,
                     made => break made?,
@@ -189,10 +193,35 @@ impl Pipeline {
         Ok(tiles)
     }
 
-    fn allocate(&mut self, device: &Device, tile: Tile) -> Result<Targets> {
+    /// How much state tiles have that are drawn one after the other.
+    pub(super) fn largest(&self, tiles: &[Tile]) -> Lot {
+        tiles.iter().map(|t| self.cut((*t).into())).fold(Lot::default(), Lot::or)
+    }
+
+    /// A lot with its samples cut into as many slices as keep the device busy.
+    pub(super) fn cut(&self, lot: Lot) -> Lot {
+        let samples = self.asset.shards.iter().map(|s| s.range.len()).max().unwrap_or(0);
+        let lot = lot.sliced(self.workgroups, samples.div_ceil(BATCH) as u32, self.most_sums);
+        if self.asset.pixel_state().kept { lot.kept() } else { lot }
+    }
+
+    /// Another number of workgroups that keep the device busy.
+    pub(super) fn set_workgroups(&mut self, device: &Device, workgroups: u32) {
+        self.workgroups = if self.path() == SplatPath::Tiles { workgroups } else { 0 };
+        self.make_splatting(device);
+        self.forget_targets();
+    }
+
+    fn make_splatting(&mut self, device: &Device) {
+        let sliced = self.workgroups > 0;
+        self.splatting = Splatting::new(device, &self.common, &self.asset, self.path(), sliced);
+    }
+
+    fn allocate(&mut self, device: &Device, tiles: &[Tile]) -> Result<Targets> {
         let state = self.asset.pixel_state();
-        self.tile_memory = budget(device, state, self.most_memory).pixel_total * tile.pixels();
-        Targets::allocate(device, state, tile.into(), self.path(), self.tile_memory)
+        let lot = self.largest(tiles);
+        self.tile_memory = budget(device, state, self.most_memory).pixel_total * lot.pixels;
+        Targets::allocate(device, state, lot, self.path(), self.tile_memory)
     }
 
     /// Draws in tiles of half the memory from now on, because there is none for `what`. False where they are small already.
@@ -268,7 +297,7 @@ impl Pipeline {
             level.renew_variant(device);
         } else {
             // Another number of shards.
-            level.splatting = Splatting::new(device, &level.common, &level.asset, level.path());
+            level.make_splatting(device);
         }
         Ok(level)
     }
@@ -286,6 +315,8 @@ impl Pipeline {
             outlines: self.outlines.clone(),
             batches: self.batches.clone(),
             splatting: self.splatting.clone(),
+            workgroups: self.workgroups,
+            most_sums: self.most_sums,
             frame: FrameBuffers::new(device, &self.common, &asset),
             reuse: true,
             counting: self.counting,
@@ -346,7 +377,8 @@ impl Pipeline {
         self.views.truncate(self.relit.len());
         for &tile in tiles {
             for (&offset, rays) in offsets.iter().zip(before + 1..) {
-                self.views.push(self.view(0, frame, tile, offset, rays));
+                let view = self.view(0, frame, tile, offset, rays);
+                self.views.push(view.of(&self.cut(tile.into())));
             }
         }
         self.upload_views(device, queue);
@@ -361,7 +393,8 @@ impl Pipeline {
             let view = self.view(d.slot, d.frame, d.tile, [0.5; 2], 1).at(lot.add(d.tile));
             self.views.push(ViewUniform { share: d.share, per_unit: d.per_unit, ..view });
         }
-        self.views[first..].iter_mut().for_each(|view| view.viewport = lot.size);
+        let lot = self.cut(lot);
+        self.views[first..].iter_mut().for_each(|view| *view = view.of(&lot));
         (lot, first - self.relit.len())
     }
 
@@ -389,7 +422,7 @@ impl Pipeline {
         lot: impl Into<Lot>,
     ) -> Recorder<'a> {
         let view_offset = ((self.relit.len() + view) as u64 * VIEW_STRIDE) as u32;
-        Recorder { encoder, timers, common: self.frame.common(), view_offset, lot: lot.into() }
+        Recorder { encoder, timers, common: self.frame.common(), view_offset, lot: self.cut(lot.into()) }
     }
 
     /// The targets of the frame that was begun.
@@ -452,7 +485,7 @@ impl Pipeline {
             if let (Some(profile), Some(group)) = (&self.profile, &piece.profile) {
                 profile.record(r, group, targets, k);
             }
-            self.splatting.record(r, &piece.splat, piece.resolve.as_ref(), &self.asset, targets, k);
+            self.splatting.record(r, &piece.sums, &self.asset, targets, k);
         }
     }
 
@@ -461,8 +494,7 @@ impl Pipeline {
         let each = |bind: &dyn Fn(&Shard) -> BindGroup| asset.shards.iter().map(bind).collect::<Vec<_>>();
         let piece = |k: usize| PieceGroups {
             profile: self.profile.as_ref().map(|p| p.bind(device, asset, targets, k)),
-            splat: each(&|s| self.splatting.bind(device, s, targets, k)),
-            resolve: self.splatting.bind_resolve(device, targets, k),
+            sums: self.splatting.bind(device, asset, targets, k),
         };
         Groups {
             lighting: each(&|s| self.lighting.bind(device, asset, s, frame)),

@@ -29,6 +29,13 @@ impl SplatPath {
         if quads { Self::Quads } else { Self::Tiles }
     }
 
+    /// How many workgroups keep a device busy: where a picture has fewer tiles several share each of them. A software adapter has
+    /// no more than a few threads.
+    pub(super) fn workgroups(self, device: &Device) -> u32 {
+        let software = device.adapter_info().device_type == DeviceType::Cpu;
+        if self == Self::Quads || software { 0 } else { 1024 }
+    }
+
     /// Itself where the device can take it.
     ///
     /// # Errors
@@ -53,24 +60,47 @@ impl SplatPath {
 #[derive(Clone)]
 pub(super) enum Splatting {
     Quads(Splat, Resolve),
-    /// The second where sums are kept from shard to shard.
-    Tiles(Gather, Option<Resolve>),
+    Tiles {
+        /// Where samples are one shard: sums join the picture at once.
+        joined: Option<Gather>,
+        /// Where sums are kept, from shard to shard or slice by slice.
+        kept: Option<(Gather, Resolve)>,
+    },
+}
+
+/// The groups of one piece.
+pub(super) struct SumGroups {
+    /// One for each shard, of sums that are blended or join the picture at once.
+    shards: Vec<BindGroup>,
+    /// The same of sums that are kept.
+    kept: Vec<BindGroup>,
+    resolve: Option<BindGroup>,
 }
 
 impl Splatting {
-    pub fn new(device: &Device, common: &BindGroupLayout, asset: &AssetBuffers, path: SplatPath) -> Self {
-        let resolve = || Resolve::new(device, common, asset);
-        match path {
-            SplatPath::Quads => Self::Quads(Splat::new(device, common, asset), resolve()),
-            SplatPath::Tiles => {
-                Self::Tiles(Gather::new(device, common, asset), asset.pixel_state().kept.then(resolve))
-            }
+    /// `sliced`: samples may be cut into slices.
+    pub fn new(
+        device: &Device,
+        common: &BindGroupLayout,
+        asset: &AssetBuffers,
+        path: SplatPath,
+        sliced: bool,
+    ) -> Self {
+        if path == SplatPath::Quads {
+            return Self::Quads(Splat::new(device, common, asset), Resolve::new(device, common, asset, false));
+        }
+        let sharded = asset.pixel_state().kept;
+        let gather = |kept: bool| Gather::new(device, common, asset, kept);
+        Self::Tiles {
+            joined: (!sharded).then(|| gather(false)),
+            kept: (sharded || sliced).then(|| (gather(true), Resolve::new(device, common, asset, true))),
         }
     }
+
     pub fn path(&self) -> SplatPath {
         match self {
             Self::Quads(..) => SplatPath::Quads,
-            Self::Tiles(..) => SplatPath::Tiles,
+            Self::Tiles { .. } => SplatPath::Tiles,
         }
     }
 
@@ -78,45 +108,55 @@ impl Splatting {
     pub fn set_variant(&mut self, device: &Device, variant: Variant) {
         match self {
             Self::Quads(splat, _) => splat.set_variant(device, variant),
-            Self::Tiles(gather, _) => gather.set_variant(device, variant),
+            Self::Tiles { joined, kept } => {
+                let gathers = joined.iter_mut().chain(kept.iter_mut().map(|(gather, _)| gather));
+                gathers.for_each(|g| g.set_variant(device, variant));
+            }
         }
     }
 
-    /// For piece `k` of a shard.
-    pub fn bind(&self, device: &Device, shard: &Shard, targets: &Targets, k: usize) -> BindGroup {
+    /// For piece `k`.
+    pub fn bind(&self, device: &Device, asset: &AssetBuffers, targets: &Targets, k: usize) -> SumGroups {
+        let each = |bind: &dyn Fn(&Shard) -> BindGroup| asset.shards.iter().map(bind).collect::<Vec<_>>();
+        let of = |gather: &Gather| each(&|s| gather.bind(device, s, targets, k));
         match self {
-            Self::Quads(splat, _) => splat.bind(device, shard, targets, k),
-            Self::Tiles(gather, _) => gather.bind(device, shard, targets, k),
+            Self::Quads(splat, resolve) => SumGroups {
+                shards: each(&|s| splat.bind(device, s, targets, k)),
+                kept: Vec::new(),
+                resolve: Some(resolve.bind(device, targets, k)),
+            },
+            Self::Tiles { joined, kept } => SumGroups {
+                shards: joined.as_ref().map(of).unwrap_or_default(),
+                kept: kept.as_ref().map(|(gather, _)| of(gather)).unwrap_or_default(),
+                resolve: kept.as_ref().map(|(_, resolve)| resolve.bind(device, targets, k)),
+            },
         }
     }
 
-    /// For piece `k`, where sums have to be resolved.
-    pub fn bind_resolve(&self, device: &Device, targets: &Targets, k: usize) -> Option<BindGroup> {
-        self.resolve().map(|r| r.bind(device, targets, k))
-    }
-
-    fn resolve(&self) -> Option<&Resolve> {
-        match self {
-            Self::Quads(_, resolve) => Some(resolve),
-            Self::Tiles(_, resolve) => resolve.as_ref(),
-        }
-    }
-
-    /// Adds piece `k` of every pixel to the picture, from the groups of its shards and of its end.
+    /// Adds piece `k` of every pixel to the picture.
     pub fn record(
         &self,
         r: &mut Recorder,
-        shards: &[BindGroup],
-        end: Option<&BindGroup>,
+        groups: &SumGroups,
         asset: &AssetBuffers,
         targets: &Targets,
         k: usize,
     ) {
-        match self {
-            Self::Quads(quads, _) => quads.record(r, shards, asset, targets, k),
-            Self::Tiles(gather, _) => gather.record(r, shards, targets, k),
-        }
-        if let (Some(resolve), Some(group)) = (self.resolve(), end) {
+        let resolve = match self {
+            Self::Quads(quads, resolve) => {
+                quads.record(r, &groups.shards, asset, targets, k);
+                Some(resolve)
+            }
+            Self::Tiles { joined: Some(gather), .. } if r.lot.sums == 0 => {
+                gather.record(r, &groups.shards, targets, k);
+                None
+            }
+            Self::Tiles { kept, .. } => kept.as_ref().map(|(gather, resolve)| {
+                gather.record(r, &groups.kept, targets, k);
+                resolve
+            }),
+        };
+        if let (Some(resolve), Some(group)) = (resolve, &groups.resolve) {
             resolve.record(r, group, targets, k);
         }
     }

@@ -37,8 +37,8 @@ pub(super) const RADIANCE: u64 = 16;
 pub(super) const COUNTERS: u64 = 16;
 const PIECE: u64 = 16;
 const CELL: u64 = 16;
-/// Numerator and denominator, as tiles keep them from shard to shard.
-const KEPT: u64 = 32;
+/// Numerator and denominator, as tiles keep them from shard to shard or slice by slice.
+pub(super) const KEPT: u64 = 32;
 /// Where the lists of tiles begin, and the bytes of one tile in them.
 const LISTS: u64 = 256;
 const LISTED: u64 = 4;
@@ -67,7 +67,7 @@ pub(super) struct Targets {
     pub cells: Buffer,
     /// See [`crate::rendered::Census`]; [`CENSUS`] bytes.
     pub census: Buffer,
-    /// Sums of the current piece, where samples are several shards and drawn by tiles.
+    /// Sums of the current piece, where samples are several shards or slices and drawn by tiles.
     pub kept: Buffer,
     pub marker: TextureView,
     pub numerator: TextureView,
@@ -175,7 +175,7 @@ impl Targets {
             tile_stride,
             cells: buffer("cells", CELL * MAX_PIECES as u64 * cell_stride, state),
             census: buffer("census", CENSUS, read),
-            kept: buffer("kept", if needs.kept { KEPT * pixels } else { 0 }, state),
+            kept: buffer("kept", KEPT * lot.sums, state),
             marker: texture("marker", MARKER_FORMAT, lot.size),
             numerator: texture("numerator", SUM_FORMAT, blended),
             denominator: texture("denominator", SUM_FORMAT, blended),

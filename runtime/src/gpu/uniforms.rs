@@ -11,7 +11,7 @@ use diaphane_formats::kernel;
 use diaphane_formats::slopes::{CELL_RADIUS, STEEPEST, means_share};
 use glam::{DVec3, Vec3};
 
-use super::lot::Place;
+use super::lot::{Lot, Place};
 use super::tiles::Tile;
 
 /// Surface nearer to the camera than this fraction of the diagonal is not seen.
@@ -51,7 +51,9 @@ pub(super) struct ViewUniform {
     pub first_light: u32,
     pub first_ambient: u32,
     pub per_unit: f32,
-    pub unused: [u32; 21],
+    pub slices: u32,
+    pub pixels: u32,
+    pub unused: [u32; 19],
 }
 
 /// What a frame's rays need to know about its lights.
@@ -117,14 +119,21 @@ impl ViewUniform {
             first_light: lights.first_light,
             first_ambient: lights.first_ambient,
             per_unit: 1.0,
-            unused: [0; 21],
+            slices: 1,
+            pixels: tile.pixels() as u32,
+            unused: [0; 19],
         }
     }
 
-    /// The same among other tiles.
+    /// The same at a place among other tiles.
     pub fn at(self, place: Place) -> Self {
         let Place { first_pixel, first_cell, first_tile } = place;
         Self { first_pixel, first_cell, first_tile, ..self }
+    }
+
+    /// The same as one of a lot.
+    pub fn of(self, lot: &Lot) -> Self {
+        Self { viewport: lot.size, slices: lot.slices, pixels: lot.pixels as u32, ..self }
     }
 }
 
@@ -267,7 +276,7 @@ mod tests {
                 "vec3f" | "vec3u" => (16, 12),
                 "vec2f" | "vec2u" => (8, 8),
                 "f32" | "u32" => (4, 4),
-                "array<vec4u, 5>" => (16, 80),
+                "array<vec4u, 4>" => (16, 64),
                 other => panic!("{other}"),
             };
             at = at.next_multiple_of(align);
@@ -324,7 +333,9 @@ mod tests {
             slot,
             first_light,
             first_ambient,
-            per_unit
+            per_unit,
+            slices,
+            pixels
         );
         mirrors!(
             MediumUniform,

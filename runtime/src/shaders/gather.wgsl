@@ -1,6 +1,7 @@
 // Gather pass: the kernels along the current piece of every pixel of a tile, summed in registers, and what comes of
 // them added to the picture: splat and resolve in one, without blending. (Where the samples are several shards sums are kept
-// from one to the next, and the resolve pass follows.)
+// from one to the next; where tiles are few, several workgroups share a tile, a slice of the samples each. The resolve pass
+// follows both.)
 //
 // A workgroup first finds the clusters of 64 samples that rays of its tile may meet, then those of their samples; the
 // bits of `marks` keep them in order, so that the sums do not depend on threads. Each thread then has two pixels side by
@@ -179,8 +180,8 @@ fn pick_tile(group: u32) -> vec2u {
     return vec2u(listed_tile & 0x1fffu, (listed_tile >> 13u) & 0x1fffu);
 }
 
-// One of 64 threads of a tile; `lane` of `lanes` that can talk.
-fn gather(tile: vec2u, local: u32, lane: u32, lanes: u32) {
+// One of 64 threads of a tile and a slice of the samples; `lane` of `lanes` that can talk.
+fn gather(tile: vec2u, slice: u32, local: u32, lane: u32, lanes: u32) {
     if (local < WORDS) {
         atomicStore(&marks[local], 0u);
     }
@@ -209,11 +210,13 @@ fn gather(tile: vec2u, local: u32, lane: u32, lanes: u32) {
     var sums: array<PairSums, HALVES>;
     for (var half = 0u; half < HALVES; half++) {
         let rays = rays_of(tile, half, local);
-        sums[half] = PairSums(begin(rays.left), begin(rays.right));
+        sums[half] = PairSums(begin(rays.left, slice), begin(rays.right, slice));
     }
-    let total = (medium.samples + CLUSTER - 1u) / CLUSTER;
-    for (var first = 0u; first < total; first += ROUND) {
-        for (var bit = local; bit < min(ROUND, total - first); bit += CLUSTER) {
+    // All tiles have as many slices; the same for all threads, as barriers want it.
+    let clusters = (medium.samples + CLUSTER - 1u) / CLUSTER;
+    let end_of_slice = clusters * (slice + 1u) / views[0].slices;
+    for (var first = clusters * slice / views[0].slices; first < end_of_slice; first += ROUND) {
+        for (var bit = local; bit < min(ROUND, end_of_slice - first); bit += CLUSTER) {
             let sphere = samples[medium.samples + first + bit];
             if (sphere.w > 0.0 && may_meet(cone, sphere.xyz - view.origin, sphere.w)) {
                 mark(bit);
@@ -259,7 +262,7 @@ fn gather(tile: vec2u, local: u32, lane: u32, lanes: u32) {
     }
     for (var half = 0u; half < HALVES; half++) {
         let rays = rays_of(tile, half, local);
-        finish(rays.left, sums[half].left);
-        finish(rays.right, sums[half].right);
+        finish(rays.left, slice, sums[half].left);
+        finish(rays.right, slice, sums[half].right);
     }
 }

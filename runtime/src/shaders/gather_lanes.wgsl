@@ -39,5 +39,5 @@ fn gather_by_lanes(
     @builtin(subgroup_invocation_id) lane: u32,
     @builtin(subgroup_size) lanes: u32,
 ) {
-    gather(pick_tile(group.x), local, lane, lanes);
+    gather(pick_tile(group.x), group.y, local, lane, lanes);
 }

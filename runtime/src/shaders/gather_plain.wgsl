@@ -10,5 +10,5 @@ fn add_listed(before: PairSums, count: u32, lane: u32, lanes: u32, rays: Pair) -
 
 @compute @workgroup_size(64)
 fn gather_plainly(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) local: u32) {
-    gather(pick_tile(group.x), local, 0u, 1u);
+    gather(pick_tile(group.x), group.y, local, 0u, 1u);
 }

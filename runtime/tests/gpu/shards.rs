@@ -1,4 +1,5 @@
 //! Assets with more samples than an adapter binds at once: devices are told to bind less than they can, and hold the renderer to it.
+//! And small pictures, whose samples several workgroups share.
 
 use super::objects::{Object, ball, torus, uneven_grid};
 use super::scenes::{self, level, outside, scene};
@@ -38,6 +39,8 @@ fn compare(name: &str, asset: &Asset, frame: &Frame, exact: Option<&ExactDepths>
         let Some(mut whole) = gpu_with(asset, path) else { return };
         let mut cut = within(MEBIBYTE, asset, path).unwrap();
         assert_eq!((whole.shards(), cut.shards()), (1, 3), "{name}: {} samples", asset.samples.len());
+        whole.set_workgroups(0);
+        cut.set_workgroups(0);
         let expected = whole.render(frame, exact).unwrap();
         let got = cut.render(frame, exact).unwrap();
         assert_eq!(cut.tiles(), 1);
@@ -53,6 +56,17 @@ fn compare(name: &str, asset: &Asset, frame: &Frame, exact: Option<&ExactDepths>
         assert_eq!(count(&got), count(&expected), "{name} by {}", path.name());
         // What is kept from shard to shard is not kept from frame to frame.
         assert!(cut.render(frame, exact).unwrap().picture == got.picture);
+        if path == SplatPath::Tiles {
+            for mut renderer in [whole, cut] {
+                renderer.set_workgroups(256);
+                let sliced = renderer.render(frame, exact).unwrap();
+                assert!(renderer.slices() >= 20, "{name}: {} slices", renderer.slices());
+                let worst = difference(&sliced, &expected);
+                println!("{name} in {} slices: {worst:.1e} of the peak", renderer.slices());
+                assert!(worst <= bound, "{name} in slices: {worst}");
+                assert_eq!(count(&sliced), count(&expected), "{name} in slices");
+            }
+        }
     }
 }
 

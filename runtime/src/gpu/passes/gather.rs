@@ -25,10 +25,9 @@ pub(crate) struct Gather {
 }
 
 impl Gather {
-    pub fn new(device: &Device, common: &BindGroupLayout, asset: &AssetBuffers) -> Self {
+    pub fn new(device: &Device, common: &BindGroupLayout, asset: &AssetBuffers, kept: bool) -> Self {
         use Slot::{Read, Write};
         let slots = [Read, Read, Read, Read, Read, Write, Write, Write];
-        let kept = asset.pixel_state().kept;
         let slots = if kept { &slots[..6] } else { &slots[..] };
         let layout = layout(device, "gather", ShaderStages::COMPUTE, slots);
         let pipeline_layout = pipeline_layout(device, "gather", common, &layout);

@@ -18,9 +18,8 @@ pub(crate) struct Resolve {
 }
 
 impl Resolve {
-    pub fn new(device: &Device, common: &BindGroupLayout, asset: &AssetBuffers) -> Self {
+    pub fn new(device: &Device, common: &BindGroupLayout, asset: &AssetBuffers, kept: bool) -> Self {
         use Slot::{Read, Texture, Write};
-        let kept = asset.pixel_state().kept;
         let sums = if kept { &[Read][..] } else { &[Texture, Texture] };
         let slots = [&[Read, Read, Write, Write, Write], sums].concat();
         let layout = layout(device, "resolve", ShaderStages::COMPUTE, &slots);

@@ -30,7 +30,9 @@ struct View {
     first_light: u32,       // of its lights among those of all
     first_ambient: u32,     // of what its folded lights send, likewise
     per_unit: f32,          // the object's units of a world unit
-    unused: array<vec4u, 5>,
+    slices: u32,            // that the samples are cut into, each of which sums for itself
+    pixels: u32,            // of all tiles that are drawn together
+    unused: array<vec4u, 4>,
 }
 
 // Objects that are drawn together at the most.
