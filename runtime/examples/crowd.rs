@@ -62,6 +62,7 @@ fn main() -> Result<()> {
                     projection,
                 )?,
                 lights: &lights,
+                exact: &[],
                 environment: &[],
                 surface: Surface::DEFAULT,
                 depth: None,

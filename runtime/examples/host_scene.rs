@@ -58,6 +58,7 @@ fn main() -> Result<()> {
         size: SIZE,
         camera: HostCamera::new(view, projection)?,
         lights: &lights,
+        exact: &[],
         environment: &[],
         surface: Surface::DEFAULT,
         depth: Some(HostDepth { view: &depth_view, projection }),

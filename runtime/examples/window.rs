@@ -81,6 +81,7 @@ impl Shown {
             size,
             camera: HostCamera::new(dcamera::rh::view::look_at_mat4(eye, centre, DVec3::Y), projection)?,
             lights: &[light],
+            exact: &[],
             environment: &[],
             surface: Surface::DEFAULT,
             depth: None,

@@ -164,6 +164,11 @@ impl Schedule {
         self.settings.milliseconds = milliseconds;
     }
 
+    /// Sets the bytes that complete depths may take from now on.
+    pub fn set_memory(&mut self, bytes: u64) {
+        self.settings.memory = bytes;
+    }
+
     /// Whether the next frames will differ from this one although nothing moves.
     pub fn is_busy(&self) -> bool {
         self.busy

@@ -23,7 +23,23 @@ impl Spread {
     pub fn new(asset: &Asset, settings: Settings) -> Result<Self> {
         let tracer = DepthTracer::new(asset)?;
         tracer.prepare();
-        Ok(Self { tracer, schedule: Schedule::new(settings), info: asset.info.clone() })
+        Ok(Self::with(tracer, settings))
+    }
+
+    /// By a tracer that is there.
+    pub fn with(tracer: DepthTracer, settings: Settings) -> Self {
+        let info = tracer.info().clone();
+        Self { tracer, schedule: Schedule::new(settings), info }
+    }
+
+    /// Samples of the asset.
+    pub fn samples(&self) -> usize {
+        self.tracer.samples()
+    }
+
+    /// Sets the bytes that complete depths may take from now on.
+    pub fn set_memory(&mut self, bytes: u64) {
+        self.schedule.set_memory(bytes);
     }
 
     /// Takes extinction and albedo from an edited asset's parameters.

@@ -23,17 +23,27 @@ const CHECKED: usize = 16;
 /// Samples of a task.
 const TASK: usize = 64;
 
-/// Traces depths from an asset's samples, and remembers those of lights that stay where they are.
-pub struct DepthTracer {
+/// What rays run through; all levels and objects of an asset share it.
+struct Geometry {
     mesh: Mesh,
     medium: Medium,
+    accel: OnceLock<Accel>,
+}
+
+/// Where rays begin; all objects of a level share it.
+struct Level {
     samples: Samples,
     places: Vec<Vec3>,
-    accel: OnceLock<Accel>,
+}
+
+/// Traces depths from an asset's samples, and remembers those of lights that stay where they are.
+pub struct DepthTracer {
+    geometry: Arc<Geometry>,
+    level: Arc<Level>,
     /// As it is played.
     info: Info,
-    /// Baked light, to compare with.
-    lighting: OnceLock<Lighting>,
+    /// Baked light, to compare with; objects of the same material share it.
+    lighting: Arc<OnceLock<Lighting>>,
     traced: Vec<Traced>,
     report: ExactReport,
 }
@@ -51,25 +61,51 @@ impl DepthTracer {
     /// # Errors
     /// An asset whose mesh or medium makes no sense.
     pub fn new(asset: &Asset) -> Result<Self> {
-        Ok(Self {
-            mesh: asset.mesh()?,
-            medium: asset.medium()?,
-            places: (0..asset.samples.len()).map(|i| asset.samples.centroid(i)).collect(),
-            samples: asset.samples.clone(),
-            accel: OnceLock::new(),
+        let geometry = Geometry { mesh: asset.mesh()?, medium: asset.medium()?, accel: OnceLock::new() };
+        Ok(Self::on(Arc::new(geometry), asset))
+    }
+
+    fn on(geometry: Arc<Geometry>, asset: &Asset) -> Self {
+        let places = (0..asset.samples.len()).map(|i| asset.samples.centroid(i)).collect();
+        Self {
+            geometry,
+            level: Arc::new(Level { samples: asset.samples.clone(), places }),
             info: asset.info.clone(),
-            lighting: OnceLock::new(),
+            lighting: Arc::default(),
             traced: Vec::new(),
             report: ExactReport::default(),
-        })
+        }
+    }
+
+    /// A tracer for another level of the same asset.
+    pub fn for_level(&self, level: &Asset) -> Self {
+        Self::on(Arc::clone(&self.geometry), level)
+    }
+
+    /// A tracer for another object of the same asset, level and material.
+    pub fn another(&self) -> Self {
+        Self {
+            geometry: Arc::clone(&self.geometry),
+            level: Arc::clone(&self.level),
+            info: self.info.clone(),
+            lighting: Arc::clone(&self.lighting),
+            traced: Vec::new(),
+            report: ExactReport::default(),
+        }
     }
 
     /// Takes extinction from an edited asset's parameters: it decides how baked and exact transmittance differ. Depths stay as
     /// they are.
     pub fn set_material(&mut self, info: &Info) {
         self.info = info.clone();
-        if let Some(lighting) = self.lighting.get_mut() {
-            lighting.set_material(info);
+        match Arc::get_mut(&mut self.lighting) {
+            Some(own) => {
+                if let Some(lighting) = own.get_mut() {
+                    lighting.set_material(info);
+                }
+            }
+            // Others keep theirs.
+            None => self.lighting = Arc::default(),
         }
     }
 
@@ -91,7 +127,7 @@ impl DepthTracer {
             let place = place(light);
             let known = kept.iter().chain(&self.traced).find(|t| t.place == place);
             let (depths, error) = known.map(|t| (Arc::clone(&t.depths), t.error)).unwrap_or_else(|| {
-                let depths = self.depths(light, frame.least_distance, 0..self.places.len());
+                let depths = self.depths(light, frame.least_distance, 0..self.level.places.len());
                 report.rays += depths.len() as u64;
                 let error = self.error(light, frame.least_distance, &depths);
                 (Arc::new(Depths::new(depths)), error)
@@ -103,11 +139,21 @@ impl DepthTracer {
         report.milliseconds = started.elapsed().as_secs_f64() * 1e3;
         report.exact = lights.iter().flatten().count();
         report.baked = lights.len() - report.exact;
-        report.bytes = (report.exact * self.places.len() * size_of::<[f32; 2]>()) as u64;
+        report.bytes = (report.exact * self.level.places.len() * size_of::<[f32; 2]>()) as u64;
         report.rays_per_second = report.rays as f64 * 1e3 / report.milliseconds.max(1e-3);
         self.report = report;
         self.traced = kept;
         ExactDepths::new(lights)
+    }
+
+    /// Parameters of the asset, extinction and albedo as they are played.
+    pub fn info(&self) -> &Info {
+        &self.info
+    }
+
+    /// Number of samples.
+    pub fn samples(&self) -> usize {
+        self.level.places.len()
     }
 
     /// What the last call of [`Self::trace`] did.
@@ -121,11 +167,11 @@ impl DepthTracer {
     }
 
     fn accel(&self) -> &Accel {
-        self.accel.get_or_init(|| Accel::new(&self.mesh))
+        self.geometry.accel.get_or_init(|| Accel::new(&self.geometry.mesh))
     }
 
     fn lighting(&self) -> &Lighting {
-        self.lighting.get_or_init(|| Lighting::new(&self.info, &self.samples))
+        self.lighting.get_or_init(|| Lighting::new(&self.info, &self.level.samples))
     }
 
     fn depths(&self, light: &FrameLight, least: f32, range: Range<usize>) -> Vec<[f32; 2]> {
@@ -136,19 +182,19 @@ impl DepthTracer {
             if to == DVec3::ZERO {
                 return [0.0, 1.0];
             }
-            let depth = depth_along(accel, &self.medium, x.as_dvec3(), to, limit, scratch);
+            let depth = depth_along(accel, &self.geometry.medium, x.as_dvec3(), to, limit, scratch);
             [depth.density_length as f32, depth.boundary as f32]
         };
-        self.places[range].par_iter().with_min_len(TASK).map_init(Vec::new, trace).collect()
+        self.level.places[range].par_iter().with_min_len(TASK).map_init(Vec::new, trace).collect()
     }
 
     /// d of sample `i` for its exact depth, and what it adds to the error's sums.
     fn difference(&self, light: &FrameLight, least: f32, i: usize, depth: [f32; 2]) -> (Vec3, Squares) {
         let lighting = self.lighting();
-        let (to, _, irradiance) = light.at(self.places[i], least);
+        let (to, _, irradiance) = light.at(self.level.places[i], least);
         let exact = lighting.through(depth);
         let d = exact - lighting.arriving_from(i, to);
-        let weight = f64::from(self.samples.weight[i].max(0.0));
+        let weight = f64::from(self.level.samples.weight[i].max(0.0));
         let square = |v: Vec3| weight * (irradiance.as_dvec3() * v.as_dvec3()).length_squared();
         (d, Squares { difference: square(d), exact: square(exact) })
     }
@@ -164,7 +210,7 @@ impl DepthTracer {
 
 impl Work for (&DepthTracer, f32) {
     fn samples(&self) -> usize {
-        self.0.places.len()
+        self.0.level.places.len()
     }
 
     fn run(&mut self, light: &FrameLight, range: Range<usize>) -> (Portion, f64) {

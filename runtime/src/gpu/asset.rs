@@ -188,7 +188,6 @@ impl AssetBuffers {
     /// The same object once more, with values and sources of its own.
     pub fn instance(&self, device: &Device) -> Self {
         self.with_slots(device, self.slots)
-
     }
 
     /// Gives this instance a medium of its own.

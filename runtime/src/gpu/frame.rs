@@ -97,7 +97,8 @@ fn common_groups(
 impl FrameBuffers {
     /// Small buffers to start with.
     pub fn new(device: &Device, common: &BindGroupLayout, asset: &AssetBuffers) -> Self {
-        let views = empty_buffer(device, "views", views_size(1), BufferUsages::UNIFORM | BufferUsages::COPY_DST);
+        let views =
+            empty_buffer(device, "views", views_size(1), BufferUsages::UNIFORM | BufferUsages::COPY_DST);
         Self {
             common: common_groups(device, common, &views, asset),
             views,

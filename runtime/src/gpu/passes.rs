@@ -50,7 +50,12 @@ impl Recorder<'_> {
     }
 
     /// Points a render pass at tiles up to a size and the shared group.
-    fn aim(common: &[BindGroup], view_offset: u32, [width, height]: [u32; 2], render: &mut wgpu::RenderPass<'_>) {
+    fn aim(
+        common: &[BindGroup],
+        view_offset: u32,
+        [width, height]: [u32; 2],
+        render: &mut wgpu::RenderPass<'_>,
+    ) {
         render.set_viewport(0.0, 0.0, width as f32, height as f32, 0.0, 1.0);
         render.set_bind_group(0, &common[0], &[view_offset]);
     }

@@ -1,5 +1,10 @@
 //! The passes of a frame with everything that they read and write.
 
+mod objects;
+mod room;
+
+pub(super) use objects::Drawn;
+
 use super::asset::AssetBuffers;
 use super::frame::{FrameBuffers, Lit, Object, VIEW_STRIDE, common_layout, most_bound};
 use super::lot::Lot;
@@ -14,15 +19,15 @@ use super::passes::profile::Profile;
 use super::passes::segments::Segments;
 use super::passes::slopes::Slopes;
 use super::passes::surface::Surface;
-use super::shard::{BATCH, Shard};
+use super::shard::Shard;
 pub(super) use super::splatting::SplatPath;
 use super::splatting::{Splatting, SumGroups};
-use super::targets::{COUNTERS, KEPT, LEAST, RADIANCE, TOTAL, Targets, budget};
-use super::tiles::{Tile, split};
+use super::targets::{COUNTERS, KEPT, RADIANCE, TOTAL, Targets};
+use super::tiles::Tile;
 use super::timers::Timers;
 use super::uniforms::ViewUniform;
 use crate::exact::ExactDepths;
-use crate::fold::{LightCounts, LightingKey};
+use crate::fold::LightingKey;
 use crate::frame::Frame;
 use crate::rendered::MAX_PIECES;
 use crate::{Error, Result};
@@ -64,17 +69,6 @@ pub(super) struct Pipeline {
     pub(super) most_memory: u64,
     /// Bytes that the latest targets take, about.
     tile_memory: u64,
-}
-
-/// One tile of an object, as it is drawn with others.
-pub(super) struct Drawn<'a> {
-    pub slot: usize,
-    pub frame: &'a Frame,
-    pub tile: Tile,
-    /// `share` of view.wgsl.
-    pub share: f32,
-    /// The object's units of a world unit.
-    pub per_unit: f32,
 }
 
 /// The groups of all passes; those that mind samples have one for each shard.
@@ -186,102 +180,6 @@ impl Pipeline {
         Ok(tiles)
     }
 
-    fn split(&self, device: &Device, [low, high]: [[u32; 2]; 2]) -> Result<Vec<Tile>> {
-        let budget = budget(device, self.asset.pixel_state(), self.most_memory);
-        let mut tiles = split(high[0] - low[0], high[1] - low[1], budget)?;
-        tiles.iter_mut().for_each(|t| t.start = [t.start[0] + low[0], t.start[1] + low[1]]);
-        Ok(tiles)
-    }
-
-    /// How much state tiles have that are drawn one after the other.
-    pub(super) fn largest(&self, tiles: &[Tile]) -> Lot {
-        tiles.iter().map(|t| self.cut((*t).into())).fold(Lot::default(), Lot::or)
-    }
-
-    /// A lot with its samples cut into as many slices as keep the device busy.
-    pub(super) fn cut(&self, lot: Lot) -> Lot {
-        let samples = self.asset.shards.iter().map(|s| s.range.len()).max().unwrap_or(0);
-        let lot = lot.sliced(self.workgroups, samples.div_ceil(BATCH) as u32, self.most_sums);
-        if self.asset.pixel_state().kept { lot.kept() } else { lot }
-    }
-
-    /// Another number of workgroups that keep the device busy.
-    pub(super) fn set_workgroups(&mut self, device: &Device, workgroups: u32) {
-        self.workgroups = if self.path() == SplatPath::Tiles { workgroups } else { 0 };
-        self.make_splatting(device);
-        self.forget_targets();
-    }
-
-    fn make_splatting(&mut self, device: &Device) {
-        let sliced = self.workgroups > 0;
-        self.splatting = Splatting::new(device, &self.common, &self.asset, self.path(), sliced);
-    }
-
-    fn allocate(&mut self, device: &Device, tiles: &[Tile]) -> Result<Targets> {
-        let state = self.asset.pixel_state();
-        let lot = self.largest(tiles);
-        self.tile_memory = budget(device, state, self.most_memory).pixel_total * lot.pixels;
-        Targets::allocate(device, state, lot, self.path(), self.tile_memory)
-    }
-
-    /// Draws in tiles of half the memory from now on, because there is none for `what`. False where they are small already.
-    pub(super) fn shrink(&mut self, what: &str) -> bool {
-        let half = self.most_memory.min(self.tile_memory) / 2;
-        let may = half >= LEAST;
-        if may {
-            log::warn!("the GPU has no memory for {what}; drawing in smaller tiles");
-            self.most_memory = half;
-            self.forget_targets();
-        }
-        may
-    }
-
-    /// Forgets what the size of the picture decides, so that it is made anew.
-    pub(super) fn forget_targets(&mut self) {
-        self.targets = None;
-        self.lit.clear();
-    }
-
-    /// Uploads the lights of objects that need other sources.
-    fn light(&mut self, device: &Device, queue: &Queue, objects: &[Object<'_>]) -> Result<()> {
-        let lights = objects.iter().map(|o| o.frame.lights.len()).max().unwrap_or(0);
-        self.lit.resize(self.asset.slots, None);
-        if self.frame.reserve(device, self.asset.slots, lights)? {
-            self.lit.fill(None);
-        }
-        let mut stale = Vec::new();
-        self.pending.clear();
-        for object in objects {
-            let key = LightingKey::new(object.frame, &self.asset.info, object.exact);
-            if !self.reuse || self.lit[object.slot].as_ref() != Some(&key) {
-                // Not before all went well.
-                self.lit[object.slot] = None;
-                self.pending.push((object.slot, key));
-                stale.push(*object);
-            }
-        }
-        self.relit = if stale.is_empty() {
-            Vec::new()
-        } else {
-            self.frame.write_lights(device, queue, &self.asset, &stale)?
-        };
-        self.relit.sort_by_key(|lit| std::cmp::Reverse(lit.lights));
-        let frame_of = |slot: usize| stale.iter().find(|o| o.slot == slot).map(|o| o.frame);
-        let pixel = Tile { start: [0; 2], size: [1; 2] };
-        self.views.clear();
-        for lit in &self.relit {
-            self.views.extend(frame_of(lit.slot).map(|f| self.view(lit.slot, f, pixel, [0.5; 2], 1)));
-        }
-        Ok(())
-    }
-
-    /// Remembers what the sources depend on that are made now.
-    fn keep_lit(&mut self) {
-        for (slot, key) in self.pending.drain(..) {
-            self.lit[slot] = Some(key);
-        }
-    }
-
     /// The same object once more, with lights and sources of its own.
     pub(super) fn instance(&self, device: &Device) -> Self {
         self.with(device, self.asset.instance(device))
@@ -331,13 +229,6 @@ impl Pipeline {
         }
     }
 
-    /// Makes room for the values and sources of so many objects; those that are there are gone then.
-    pub(super) fn set_slots(&mut self, device: &Device, slots: usize) {
-        self.asset = self.asset.with_slots(device, slots);
-        self.lit.clear();
-        self.targets = None;
-    }
-
     /// Begins a frame of several objects, with targets that others use too, large enough for what is to be drawn.
     ///
     /// # Errors
@@ -357,55 +248,6 @@ impl Pipeline {
         }
         self.keep_lit();
         Ok(())
-    }
-
-    fn view(&self, slot: usize, frame: &Frame, tile: Tile, offset: [f32; 2], rays: u32) -> ViewUniform {
-        ViewUniform::new(frame, self.asset.diagonal, tile, offset, rays, self.frame.layout(slot))
-    }
-
-    /// Uploads the rays of some tiles of the object that was begun: view `t * offsets.len() + o` is offset o in tile t, added to
-    /// pictures of `before` rays.
-    pub(super) fn write_views(
-        &mut self,
-        device: &Device,
-        queue: &Queue,
-        frame: &Frame,
-        tiles: &[Tile],
-        offsets: &[[f32; 2]],
-        before: u32,
-    ) {
-        self.views.truncate(self.relit.len());
-        for &tile in tiles {
-            for (&offset, rays) in offsets.iter().zip(before + 1..) {
-                let view = self.view(0, frame, tile, offset, rays);
-                self.views.push(view.of(&self.cut(tile.into())));
-            }
-        }
-        self.upload_views(device, queue);
-    }
-
-    /// Adds the views of objects that are drawn together, a ray through the middle of every pixel. Says how much they are, and which
-    /// view is their first.
-    pub(super) fn add_lot(&mut self, drawn: &[Drawn<'_>]) -> (Lot, usize) {
-        let first = self.views.len();
-        let mut lot = Lot::default();
-        for d in drawn {
-            let view = self.view(d.slot, d.frame, d.tile, [0.5; 2], 1).at(lot.add(d.tile));
-            self.views.push(ViewUniform { share: d.share, per_unit: d.per_unit, ..view });
-        }
-        let lot = self.cut(lot);
-        self.views[first..].iter_mut().for_each(|view| *view = view.of(&lot));
-        (lot, first - self.relit.len())
-    }
-
-    /// Uploads the views that were added.
-    pub(super) fn upload_views(&mut self, device: &Device, queue: &Queue) {
-        self.frame.write_views(device, queue, &self.common, &self.asset, &self.views);
-    }
-
-    /// What became of the lights of the frame that was begun.
-    pub(super) fn light_counts(&self) -> LightCounts {
-        self.frame.plan(0).map_or_else(LightCounts::default, |p| p.counts(self.frame.fold_error(), None))
     }
 
     /// The layout of the group that all passes share.

@@ -87,7 +87,10 @@ impl Splatting {
         sliced: bool,
     ) -> Self {
         if path == SplatPath::Quads {
-            return Self::Quads(Splat::new(device, common, asset), Resolve::new(device, common, asset, false));
+            return Self::Quads(
+                Splat::new(device, common, asset),
+                Resolve::new(device, common, asset, false),
+            );
         }
         let sharded = asset.pixel_state().kept;
         let gather = |kept: bool| Gather::new(device, common, asset, kept);

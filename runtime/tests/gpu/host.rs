@@ -35,6 +35,7 @@ pub fn host_frame<'a>(scene: &'a Scene, depth: Option<HostDepth<'a>>) -> HostFra
         size: SIZE,
         camera: host_camera(&scene.camera),
         lights: &scene.lights,
+        exact: &scene.exact,
         environment: &[],
         surface: scene.surface,
         depth,
@@ -64,7 +65,7 @@ pub fn texture(device: &wgpu::Device, format: wgpu::TextureFormat) -> wgpu::Text
 
 /// A host with one target that starts as an even colour.
 pub struct Host {
-    device: wgpu::Device,
+    pub device: wgpu::Device,
     queue: wgpu::Queue,
     pub renderer: Renderer,
     background: f64,
@@ -80,7 +81,7 @@ impl Host {
         Self { device, queue, renderer, background: 0.0 }
     }
 
-    fn put(&mut self, asset: &Asset, placement: Placement) -> diaphane_runtime::gpu::InstanceId {
+    pub fn put(&mut self, asset: &Asset, placement: Placement) -> diaphane_runtime::gpu::InstanceId {
         let id = self.renderer.add_asset(&self.device, asset).unwrap();
         self.renderer.add_instance(id, placement).unwrap()
     }
@@ -283,10 +284,14 @@ fn nothing_is_done_twice_and_nothing_out_of_sight() {
     host.put(&asset, Placement { translation: behind, ..Placement::IDENTITY });
     let first = host.draw(&host_frame(&scene, None));
     let samples = asset.samples.len() as u64;
-    let all = HostReport { drawn: 1, culled: 1, lit: 1, tiles: 1, draws: 1, fading: 0, samples, reused: false };
+    let all =
+        HostReport { drawn: 1, culled: 1, lit: 1, tiles: 1, draws: 1, samples, ..HostReport::default() };
     assert_eq!(host.renderer.report(), all);
     assert_eq!(host.draw(&host_frame(&scene, None)), first);
-    assert_eq!(host.renderer.report(), HostReport { lit: 0, tiles: 0, draws: 0, samples: 0, reused: true, ..all });
+    assert_eq!(
+        host.renderer.report(),
+        HostReport { lit: 0, tiles: 0, draws: 0, samples: 0, reused: true, ..all }
+    );
     scene.camera.position.x += 0.1;
     host.draw(&host_frame(&scene, None));
     assert_eq!(host.renderer.report(), HostReport { lit: 0, ..all });

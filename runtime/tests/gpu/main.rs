@@ -4,6 +4,7 @@
 mod census;
 mod edits;
 mod endurance;
+mod exact;
 mod faults;
 mod host;
 mod objects;

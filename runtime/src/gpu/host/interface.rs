@@ -1,6 +1,7 @@
 //! What a host says of its targets and frames, and what it is told.
 
 use crate::detail::Fineness;
+use crate::exact::Settings;
 use crate::frame::FrameLight;
 use crate::gpu::pipeline::SplatPath;
 use crate::placement::HostCamera;
@@ -21,12 +22,15 @@ pub struct Options {
     pub path: Option<SplatPath>,
     /// Which levels of detail are fine enough.
     pub fineness: Fineness,
+    /// Exact depths for lights that are marked, stand still or are inside an object, computed on the CPU in so many milliseconds a
+    /// frame with so much memory for all objects; `None`: baked depths for all lights.
+    pub exact: Option<Settings>,
 }
 
 impl Options {
     /// A colour attachment alone, one sample.
     pub fn new(colour: TextureFormat) -> Self {
-        Self { colour, depth: None, sample_count: 1, path: None, fineness: Fineness::DEFAULT }
+        Self { colour, depth: None, sample_count: 1, path: None, fineness: Fineness::DEFAULT, exact: None }
     }
 }
 
@@ -49,6 +53,8 @@ pub struct HostFrame<'a> {
     pub camera: HostCamera,
     /// Lights in the world.
     pub lights: &'a [Light],
+    /// Whether each is marked exact ([`Options::exact`]); lights beyond the end are not.
+    pub exact: &'a [bool],
     /// An environment as [`crate::frame::environment_lights`] makes it.
     pub environment: &'a [FrameLight],
     /// How surfaces reflect lights.
@@ -76,6 +82,12 @@ pub struct HostReport {
     pub draws: usize,
     /// Samples of the levels that were drawn.
     pub samples: u64,
+    /// Lights with exact depths, summed over the objects.
+    pub exact: usize,
+    /// Lights that wait for theirs.
+    pub waiting: usize,
+    /// Samples times lights that were traced.
+    pub rays: u64,
     /// Whether the last picture still holds, so that nothing was recorded.
     pub reused: bool,
 }

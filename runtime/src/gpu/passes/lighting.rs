@@ -1,8 +1,8 @@
 //! The lighting pass: the value of every sample, once a frame.
 
 use super::super::asset::AssetBuffers;
-use super::super::bindings::{Slot, compute, group, layout, pipeline_layout};
 use super::super::asset::VALUE;
+use super::super::bindings::{Slot, compute, group, layout, pipeline_layout};
 use super::super::frame::{FrameBuffers, Lit};
 use super::super::shaders;
 use super::super::shard::Shard;

@@ -1,0 +1,106 @@
+//! Exact depths of a host's lights.
+
+use super::host::{FORMAT, Host, device, host_frame, peak};
+use super::objects::{Object, ball};
+use super::scenes::{outside, scene};
+use diaphane_formats::asset::Asset;
+use diaphane_formats::scene::{Light, Scene};
+use diaphane_runtime::exact::Settings;
+use diaphane_runtime::frame::Frame;
+use diaphane_runtime::gpu::{GpuDevice, Options};
+use diaphane_runtime::placement::Placement;
+use diaphane_runtime::player::{Backend, LightMode, Player};
+use glam::DVec3;
+
+/// All depths of a frame in that frame.
+const QUICK: Settings = Settings { milliseconds: 1e6, ..Settings::DEFAULT };
+
+/// One light, close to the object: baked depths of the few bands here are coarse.
+fn near_light() -> Scene {
+    let mut scene = scene(outside());
+    scene.lights.truncate(1);
+    scene
+}
+
+fn host(device: &GpuDevice, exact: Option<Settings>) -> Host {
+    let options = Options { exact, ..Options::new(FORMAT) };
+    Host::with(device.device.clone(), device.queue.clone(), options)
+}
+
+/// One ray through the middle of every pixel, with all lights exact.
+fn expected(asset: &Asset, scene: &Scene) -> Vec<[f32; 3]> {
+    let mut player = Player::new(asset, Backend::Gpu).unwrap();
+    let frame = Frame::new(scene, &asset.info).unwrap();
+    player.render(&frame, LightMode::Exact).unwrap().picture.pixels.clone()
+}
+
+fn apart(a: &[[f32; 4]], b: &[[f32; 3]]) -> f32 {
+    let off = |(a, b): (&[f32; 4], &[f32; 3])| (0..3).map(|c| (a[c] - b[c]).abs()).fold(0.0, f32::max);
+    a.iter().zip(b).map(off).fold(0.0, f32::max) / peak(a)
+}
+
+#[test]
+fn lights_at_rest_become_exact_without_a_jump_and_lose_it_when_anything_moves() {
+    let Some(gpu) = device() else { return };
+    let (asset, mut scene) = (Object { order: 3, ..ball() }.build(), near_light());
+    let exact = expected(&asset, &scene);
+    let mut baked = host(&gpu, None);
+    baked.put(&asset, Placement::IDENTITY);
+    let without = baked.draw(&host_frame(&scene, None));
+    let whole = apart(&without, &exact);
+    assert!(whole > 0.01, "{whole}");
+
+    let mut host = host(&gpu, Some(QUICK));
+    let id = host.put(&asset, Placement::IDENTITY);
+    let mut frames = vec![host.draw(&host_frame(&scene, None))];
+    assert_eq!(frames[0], without);
+    while host.renderer.is_busy() && frames.len() < 100 {
+        frames.push(host.draw(&host_frame(&scene, None)));
+    }
+    let report = host.renderer.report();
+    assert_eq!((report.exact, report.waiting), (1, 0));
+    let expected_frames = (Settings::DEFAULT.rest_frames + Settings::DEFAULT.fade_frames) as usize;
+    assert!(frames.len().abs_diff(expected_frames) <= 2, "{}", frames.len());
+    // Ever nearer, in steps; targets are half floats.
+    let steps: Vec<f32> = frames.iter().map(|f| apart(f, &exact)).collect();
+    assert!(steps[steps.len() - 1] < 2e-3, "{steps:?}");
+    for pair in steps.windows(2) {
+        assert!(pair[1] <= pair[0] + 2e-3 && pair[0] - pair[1] < 0.2 * whole + 2e-3, "{steps:?}");
+    }
+    // Nothing moves: nothing is recorded.
+    assert_eq!(host.draw(&host_frame(&scene, None)), frames[frames.len() - 1]);
+    assert!(host.renderer.report().reused);
+
+    // The object moves: the light is elsewhere in its coordinates.
+    host.renderer.place(id, Placement { translation: 0.05 * DVec3::X, ..Placement::IDENTITY }).unwrap();
+    host.draw(&host_frame(&scene, None));
+    assert_eq!(host.renderer.report().exact, 0);
+    assert!(host.renderer.is_busy());
+
+    // A marked light needs no rest.
+    let Some(Light::Point { position, .. }) = scene.lights.first_mut() else { panic!("no point light") };
+    *position += 0.3 * DVec3::Y;
+    scene.mark_exact(0, true);
+    host.draw(&host_frame(&scene, None));
+    host.draw(&host_frame(&scene, None));
+    assert_eq!(host.renderer.report().rays, asset.samples.len() as u64);
+}
+
+#[test]
+fn objects_share_the_time_of_a_frame() {
+    let Some(gpu) = device() else { return };
+    let (asset, mut scene) = (Object { spacing: 0.1, ..ball() }.build(), near_light());
+    scene.mark_exact(0, true);
+    let mut host = host(&gpu, Some(Settings { milliseconds: 1e-6, ..Settings::DEFAULT }));
+    let id = host.renderer.add_asset(&host.device, &asset).unwrap();
+    for x in [-0.5, 0.0, 0.5] {
+        let placement = Placement { translation: x * DVec3::X, ..Placement::IDENTITY };
+        host.renderer.add_instance(id, placement).unwrap();
+    }
+    host.draw(&host_frame(&scene, None));
+    host.draw(&host_frame(&scene, None));
+    let report = host.renderer.report();
+    // The first portion of the first object takes all of it.
+    assert_eq!((report.exact, report.waiting), (0, 3));
+    assert!(report.rays > 0 && report.rays <= 256, "{report:?}");
+}
