@@ -52,6 +52,8 @@ pub(super) struct AssetBuffers {
     densities: [f32; 2],
     /// Whether pixels keep sums from shard to shard in a buffer.
     kept: bool,
+    /// Whether [`MediumUniform::sight`] is what the medium lets one see.
+    limited_sight: bool,
     /// Of the widest kernel.
     least_sharpness: f32,
     pub sample_count: u32,
@@ -142,6 +144,7 @@ impl AssetBuffers {
             info: info.clone(),
             densities,
             kept: shards.len() > 1 && path == SplatPath::Tiles,
+            limited_sight: true,
             least_sharpness: kernels.iter().map(|k| k[3]).fold(f32::INFINITY, f32::min),
             sample_count: kernels.len() as u32,
             samples_drawn: samples.weight.iter().filter(|w| **w > 0.0).count() as u64,
@@ -156,9 +159,18 @@ impl AssetBuffers {
         })
     }
 
+    /// Whether samples are left out that are hidden; the others' sums hold none of them then.
+    pub fn set_sight(&mut self, queue: &Queue, limited: bool) {
+        self.limited_sight = limited;
+        self.set_material(queue, &self.info.clone());
+    }
+
     /// Takes extinction and albedo from an edited asset's parameters: a few bytes to upload.
     pub fn set_material(&mut self, queue: &Queue, info: &Info) {
         self.material.set_material(info, self.heterogeneous.then_some(self.densities[0]));
+        if !self.limited_sight {
+            self.material.sight = f32::MAX;
+        }
         self.info = info.clone();
         for shard in &self.shards {
             queue.write_buffer(&shard.medium, 0, bytemuck::bytes_of(&shard.uniform(self.material)));

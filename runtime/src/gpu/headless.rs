@@ -79,6 +79,12 @@ impl GpuRenderer {
         self.renderer.set_workgroups(&self.owned.device, workgroups);
     }
 
+    /// Whether samples are left out that no ray can see for what is in front of them, as they are at first: for measuring what
+    /// that saves and what it costs.
+    pub fn set_sight(&mut self, limited: bool) {
+        self.renderer.asset.set_sight(&self.owned.queue, limited);
+    }
+
     /// Bounds the memory that the state of a picture's pixels takes on the adapter, 512 MiB at first; pictures that
     /// need more are drawn in tiles.
     pub fn limit_memory(&mut self, bytes: u64) {
