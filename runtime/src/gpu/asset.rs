@@ -1,9 +1,9 @@
 //! Buffers that stay as long as an asset does.
 
 use super::bindings::{empty_buffer, filled_buffer};
-use super::corners::Corners;
 use super::faults::allocate;
-use super::neighbours::neighbours;
+use super::frame::most_bound;
+use super::mesh::{self, MeshPart};
 use super::packed;
 use super::shard::{SOURCE, Shard, Source, ranges};
 use super::splatting::SplatPath;
@@ -29,13 +29,8 @@ pub(super) struct AssetBuffers {
     pub shards: Vec<Shard>,
     /// What all shards' media hold, but for which samples they are.
     pub material: MediumUniform,
-    pub positions: Buffer,
-    pub triangles: Buffer,
-    /// Positions of the vertices that are drawn, and three of them for every triangle; see [`Corners`].
-    pub corners: Buffer,
-    pub indices: Buffer,
-    pub neighbours: Buffer,
-    pub normals: Buffer,
+    /// The mesh, likewise.
+    pub mesh: Vec<MeshPart>,
     pub recurrence: Buffer,
     /// Layout and profiles of the harmonics' bands.
     pub bands: Buffer,
@@ -58,7 +53,6 @@ pub(super) struct AssetBuffers {
     least_sharpness: f32,
     pub sample_count: u32,
     pub samples_drawn: u64,
-    pub triangle_count: u32,
     pub diagonal: f32,
     pub fresnel: bool,
     pub boundary_order: usize,
@@ -105,9 +99,6 @@ impl AssetBuffers {
         let densities = densities(grid.iter().map(|v| v[0].to_f32()));
         let fits = Fits::new(device);
         fits.bound("values of the samples", 16 * kernels.len())?;
-        fits.bound("triangles", 12 * asset.mesh_triangles.len())?;
-        fits.bound("normals", size_of_val(normals.as_slice()))?;
-        fits.bound("vertices", 12 * asset.mesh_positions.len())?;
         fits.bound("density grid", 4 * grid.len())?;
         if asset.mesh_triangles.len() > (u32::MAX / 3) as usize {
             return Err(Error::Gpu("the mesh has too many triangles; use the CPU backend".to_owned()));
@@ -119,18 +110,17 @@ impl AssetBuffers {
             .into_iter()
             .map(|range| Shard::new(device, &source, range, path))
             .collect();
-        let corners = Corners::new(&asset.mesh_triangles, asset.mesh_positions.len());
-        let drawn: Vec<[f32; 3]> =
-            corners.vertices.iter().map(|v| asset.mesh_positions[*v as usize]).collect();
-        fits.held("triangles' corners", 12 * drawn.len().max(asset.mesh_triangles.len()))?;
+        let surface = mesh::Source {
+            positions: &asset.mesh_positions,
+            triangles: &asset.mesh_triangles,
+            normals: &normals,
+        };
+        let mesh = surface
+            .upload(device, fits.binding)
+            .ok_or_else(|| fits.refuse("triangles", mesh::LARGEST as usize * asset.mesh_triangles.len()))?;
         let storage = BufferUsages::STORAGE;
         Ok(Self {
-            positions: filled_buffer(device, "positions", &asset.mesh_positions, storage),
-            triangles: filled_buffer(device, "triangles", &asset.mesh_triangles, storage),
-            corners: filled_buffer(device, "corners", &drawn, BufferUsages::VERTEX),
-            indices: filled_buffer(device, "indices", &corners.indices, BufferUsages::INDEX),
-            neighbours: filled_buffer(device, "neighbours", &neighbours(&asset.mesh_triangles), storage),
-            normals: filled_buffer(device, "normals", normals.as_flattened(), storage),
+            mesh,
             recurrence: filled_buffer(device, "recurrence", &recurrence, BufferUsages::UNIFORM),
             bands: filled_buffer(device, "bands", &packed::bands(&samples), BufferUsages::UNIFORM),
             grid: filled_buffer(device, "grid", grid, storage),
@@ -148,7 +138,6 @@ impl AssetBuffers {
             least_sharpness: kernels.iter().map(|k| k[3]).fold(f32::INFINITY, f32::min),
             sample_count: kernels.len() as u32,
             samples_drawn: samples.weight.iter().filter(|w| **w > 0.0).count() as u64,
-            triangle_count: asset.mesh_triangles.len() as u32,
             diagonal: info.diagonal(),
             fresnel,
             boundary_order: info.boundary_order as usize,
@@ -258,19 +247,15 @@ fn densities(values: impl Iterator<Item = f32>) -> [f32; 2] {
     values.map(|v| [v; 2]).reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])]).unwrap_or([1.0; 2])
 }
 
-/// What the device's limits let buffers hold.
+/// What the device's limits let a shader see at once.
 struct Fits {
     /// Bytes of a binding.
     binding: u64,
-    /// Bytes of a buffer.
-    buffer: u64,
 }
 
 impl Fits {
     fn new(device: &Device) -> Self {
-        let limits = device.limits();
-        let buffer = limits.max_buffer_size;
-        Self { binding: limits.max_storage_buffer_binding_size.min(buffer), buffer }
+        Self { binding: most_bound(device) }
     }
 
     /// Whether a shader may see so many bytes at once.
@@ -278,24 +263,12 @@ impl Fits {
         if bytes as u64 > self.binding { Err(self.refuse(what, bytes)) } else { Ok(()) }
     }
 
-    /// Whether a buffer that no shader binds may hold them.
-    fn held(&self, what: &str, bytes: usize) -> Result<()> {
-        if bytes as u64 > self.buffer {
-            return Err(too_large(what, bytes, "max_buffer_size", self.buffer));
-        }
-        Ok(())
-    }
-
     fn refuse(&self, what: &str, bytes: usize) -> Error {
-        too_large(what, bytes, "max_storage_buffer_binding_size", self.binding)
+        let mib = |bytes: u64| bytes as f64 / f64::from(1 << 20);
+        Error::Gpu(format!(
+            "the asset's {what} take {:.1} MiB, the adapter's max_storage_buffer_binding_size is {:.1} MiB; use the CPU backend",
+            mib(bytes as u64),
+            mib(self.binding)
+        ))
     }
-}
-
-fn too_large(what: &str, bytes: usize, limit: &str, most: u64) -> Error {
-    let mib = |bytes: u64| bytes as f64 / f64::from(1 << 20);
-    Error::Gpu(format!(
-        "the asset's {what} take {:.1} MiB, the adapter's {limit} is {:.1} MiB; use the CPU backend",
-        mib(bytes as u64),
-        mib(most)
-    ))
 }

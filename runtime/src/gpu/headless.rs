@@ -102,6 +102,11 @@ impl GpuRenderer {
         self.slices
     }
 
+    /// Parts that the mesh is cut into, likewise.
+    pub fn mesh_parts(&self) -> usize {
+        self.renderer.asset.mesh.len()
+    }
+
     /// Parts that the samples are cut into; more than one where they are too many for the adapter's bindings.
     pub fn shards(&self) -> usize {
         self.renderer.asset.shards.len()

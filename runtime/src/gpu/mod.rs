@@ -25,6 +25,7 @@ mod frame;
 mod headless;
 mod host;
 mod lot;
+mod mesh;
 mod neighbours;
 mod packed;
 mod passes;

@@ -71,13 +71,13 @@ pub(super) struct Pipeline {
     tile_memory: u64,
 }
 
-/// The groups of all passes; those that mind samples have one for each shard.
+/// The groups of all passes; those that mind samples have one for each shard, those that draw the mesh one for each part.
 struct Groups {
     lighting: Vec<BindGroup>,
     fold: Vec<BindGroup>,
     slopes: Vec<BindGroup>,
-    surface: BindGroup,
-    boundary: Option<BindGroup>,
+    surface: Vec<BindGroup>,
+    boundary: Vec<BindGroup>,
     segments: BindGroup,
     outlines: Vec<BindGroup>,
     batches: Vec<BindGroup>,
@@ -311,9 +311,9 @@ impl Pipeline {
             return;
         };
         let r = &mut self.recorder(encoder, timers, view, lot);
-        self.surface.record(r, &groups.surface, &self.asset, targets);
-        if let (Some(boundary), Some(group)) = (&self.boundary, &groups.boundary) {
-            boundary.record(r, group, &self.asset, targets);
+        self.surface.record(r, &groups.surface, &self.asset.mesh, targets);
+        if let Some(boundary) = &self.boundary {
+            boundary.record(r, &groups.boundary, &self.asset.mesh, targets);
         }
         self.segments.record(r, &groups.segments, targets);
         if let Some((clip, group)) = clip {
@@ -342,8 +342,12 @@ impl Pipeline {
             lighting: each(&|s| self.lighting.bind(device, asset, s, frame)),
             fold: each(&|s| self.fold.bind(device, asset, s, frame)),
             slopes: each(&|s| self.slopes.bind(device, asset, s)),
-            surface: self.surface.bind(device, asset, targets),
-            boundary: self.boundary.as_ref().map(|b| b.bind(device, asset, frame, targets)),
+            surface: asset.mesh.iter().map(|part| self.surface.bind(device, part, targets)).collect(),
+            boundary: asset
+                .mesh
+                .iter()
+                .filter_map(|part| Some(self.boundary.as_ref()?.bind(device, part, frame, targets)))
+                .collect(),
             segments: self.segments.bind(device, targets),
             outlines: each(&|s| self.outlines.bind(device, s, targets)),
             batches: each(&|s| self.batches.bind(device, s, targets)),

@@ -113,16 +113,38 @@ fn materials_reach_all_shards() {
 }
 
 #[test]
+fn a_mesh_in_parts_is_the_same_picture() {
+    let plain = Object { spacing: 0.15, ..torus() };
+    let glassy = Object { spacing: 0.3, ior: 1.4, ..ball() };
+    for (name, object) in [("torus", plain), ("glassy ball", glassy)] {
+        let asset = object.build();
+        let frame = frame(&asset, |s| {
+            s.surface.reflection = true;
+            s.camera = level();
+        });
+        let Some(mut whole) = gpu(&asset) else { return };
+        // Holds the four pieces of all pixels.
+        let mut cut = within(96 << 10, &asset, whole.path()).unwrap();
+        let expected = whole.render(&frame, None).unwrap();
+        let got = cut.render(&frame, None).unwrap();
+        assert_eq!((cut.tiles(), whole.mesh_parts()), (1, 1), "{name}");
+        assert!(cut.mesh_parts() >= 2, "{name}: {} parts", cut.mesh_parts());
+        println!("{name}: {} parts", cut.mesh_parts());
+        assert!(got.picture == expected.picture && got.counters == expected.counters, "{name}");
+    }
+}
+
+#[test]
 fn what_cannot_be_cut_is_refused_with_the_limit_and_the_way_out() {
     let asset = Object { spacing: 0.3, ..ball() }.build();
     if gpu(&asset).is_none() {
         return;
     }
-    // The mesh: 5,120 triangles are 61 kB.
-    let error = within(48 << 10, &asset, SplatPath::Tiles).err().unwrap();
+    // Samples: the neighbours of 64 of them are 14 kB.
+    let error = within(8 << 10, &asset, SplatPath::Tiles).err().unwrap();
     let line = error.to_string();
     assert!(matches!(error, Error::Gpu(_)), "{line}");
-    for part in ["triangles", "max_storage_buffer_binding_size", "CPU backend"] {
+    for part in ["samples", "max_storage_buffer_binding_size", "CPU backend"] {
         assert!(line.contains(part), "{line}");
     }
     assert!(!line.contains('\n'), "{line}");

@@ -1,8 +1,8 @@
 //! The boundary pass: Fresnel reflectance of every crossing and the highlight of the first entry.
 
-use super::super::asset::AssetBuffers;
 use super::super::bindings::{Slot, group, layout, pipeline_layout};
 use super::super::frame::FrameBuffers;
+use super::super::mesh::MeshPart;
 use super::super::shaders;
 use super::super::targets::{BOUNDARY, Targets};
 use super::super::timers::Pass;
@@ -31,24 +31,25 @@ impl Boundary {
     pub fn bind(
         &self,
         device: &Device,
-        asset: &AssetBuffers,
+        part: &MeshPart,
         frame: &FrameBuffers,
         targets: &Targets,
     ) -> BindGroup {
         let resources = [
-            &asset.positions,
-            &asset.triangles,
+            &part.positions,
+            &part.triangles,
             &targets.crossings,
-            &asset.neighbours,
-            &asset.normals,
+            &part.neighbours,
+            &part.normals,
             &frame.lights,
             &targets.boundary,
         ];
         group(device, "boundary", &self.layout, resources.map(|b| b.as_entire_binding()).into())
     }
 
-    pub fn record(&self, r: &mut Recorder, group: &BindGroup, asset: &AssetBuffers, targets: &Targets) {
+    /// With a group for each part of the mesh.
+    pub fn record(&self, r: &mut Recorder, groups: &[BindGroup], mesh: &[MeshPart], targets: &Targets) {
         r.clear_pixels(&targets.boundary, BOUNDARY);
-        draw_mesh(r, Pass::Boundary, &self.pipeline, group, asset, targets);
+        draw_mesh(r, Pass::Boundary, &self.pipeline, groups, mesh, targets);
     }
 }

@@ -1,7 +1,7 @@
 //! The surface pass: crossings of all rays with the mesh.
 
-use super::super::asset::AssetBuffers;
 use super::super::bindings::{Slot, group, layout, options, pipeline_layout};
+use super::super::mesh::MeshPart;
 use super::super::shaders;
 use super::super::targets::{CROSSINGS, MARKER_FORMAT, Targets};
 use super::super::timers::Pass;
@@ -34,14 +34,15 @@ impl Surface {
         Self { layout, pipeline }
     }
 
-    pub fn bind(&self, device: &Device, asset: &AssetBuffers, targets: &Targets) -> BindGroup {
-        let resources = [&asset.positions, &asset.triangles, &targets.crossings, &asset.neighbours];
+    pub fn bind(&self, device: &Device, part: &MeshPart, targets: &Targets) -> BindGroup {
+        let resources = [&part.positions, &part.triangles, &targets.crossings, &part.neighbours];
         group(device, "surface", &self.layout, resources.map(|b| b.as_entire_binding()).into())
     }
 
-    pub fn record(&self, r: &mut Recorder, group: &BindGroup, asset: &AssetBuffers, targets: &Targets) {
+    /// With a group for each part of the mesh.
+    pub fn record(&self, r: &mut Recorder, groups: &[BindGroup], mesh: &[MeshPart], targets: &Targets) {
         r.clear_pixels(&targets.crossings, CROSSINGS);
-        draw_mesh(r, Pass::Surface, &self.pipeline, group, asset, targets);
+        draw_mesh(r, Pass::Surface, &self.pipeline, groups, mesh, targets);
     }
 }
 
@@ -99,8 +100,8 @@ pub(super) fn draw_mesh(
     r: &mut Recorder,
     pass: Pass,
     pipeline: &RenderPipeline,
-    group: &BindGroup,
-    asset: &AssetBuffers,
+    groups: &[BindGroup],
+    mesh: &[MeshPart],
     targets: &Targets,
 ) {
     let mut render = r.encoder.begin_render_pass(&RenderPassDescriptor {
@@ -118,8 +119,10 @@ pub(super) fn draw_mesh(
     });
     render.set_pipeline(pipeline);
     Recorder::aim(r.common, r.view_offset, r.lot.size, &mut render);
-    render.set_bind_group(1, group, &[]);
-    render.set_vertex_buffer(0, asset.corners.slice(..));
-    render.set_index_buffer(asset.indices.slice(..), IndexFormat::Uint32);
-    render.draw_indexed(0..3 * asset.triangle_count, 0, 0..r.lot.count);
+    for (group, part) in groups.iter().zip(mesh) {
+        render.set_bind_group(1, group, &[]);
+        render.set_vertex_buffer(0, part.corners.slice(..));
+        render.set_index_buffer(part.indices.slice(..), IndexFormat::Uint32);
+        render.draw_indexed(0..3 * part.triangle_count, 0, 0..r.lot.count);
+    }
 }
