@@ -6,6 +6,7 @@ use super::frame::most_bound;
 use super::mesh::{self, MeshPart};
 use super::packed;
 use super::shard::{SOURCE, Shard, Source, ranges};
+use super::slabs::{MOST_SLABS, Slabs};
 use super::splatting::SplatPath;
 use super::targets::PixelState;
 use super::uniforms::MediumUniform;
@@ -34,7 +35,7 @@ pub(super) struct AssetBuffers {
     pub recurrence: Buffer,
     /// Layout and profiles of the harmonics' bands.
     pub bands: Buffer,
-    pub grid: Buffer,
+    pub slabs: Slabs,
     /// Of all samples, whatever their shard, because slopes look at neighbours; written by the lighting pass.
     pub values: Buffer,
     /// Objects that have a part of them, and of the shards' sources.
@@ -95,11 +96,13 @@ impl AssetBuffers {
         let normals = if fresnel { corner_normals(&asset.mesh()?) } else { Vec::new() };
         let recurrence: Vec<[f32; 4]> = sh::shader_table().iter().map(|&[a, b]| [a, b, 0.0, 0.0]).collect();
         let grid = asset.density.as_ref().map_or(&[][..], |g| &g.values);
-        let material = MediumUniform::new(asset);
+        let mut material = MediumUniform::new(asset);
         let densities = densities(grid.iter().map(|v| v[0].to_f32()));
         let fits = Fits::new(device);
         fits.bound("values of the samples", 16 * kernels.len())?;
-        fits.bound("density grid", 4 * grid.len())?;
+        let slabs = Slabs::new(device, asset.density.as_ref(), fits.binding)
+            .ok_or_else(|| fits.refuse("density grid", 4 * grid.len() / MOST_SLABS))?;
+        material.grid_layers = slabs.layers;
         if asset.mesh_triangles.len() > (u32::MAX / 3) as usize {
             return Err(Error::Gpu("the mesh has too many triangles; use the CPU backend".to_owned()));
         }
@@ -123,7 +126,7 @@ impl AssetBuffers {
             mesh,
             recurrence: filled_buffer(device, "recurrence", &recurrence, BufferUsages::UNIFORM),
             bands: filled_buffer(device, "bands", &packed::bands(&samples), BufferUsages::UNIFORM),
-            grid: filled_buffer(device, "grid", grid, storage),
+            slabs,
             values: empty_buffer(
                 device,
                 "values",
@@ -206,8 +209,9 @@ impl AssetBuffers {
     /// Whether another asset's passes are compiled with the same constants, its [`Variant`] aside.
     pub fn compiles_as(&self, asset: &Asset) -> bool {
         let boundary_order = asset.info.boundary_order as usize;
-        (self.fresnel, self.boundary_order, self.heterogeneous)
-            == (asset.info.ior != 1.0, boundary_order, asset.density.is_some())
+        let several = self.slabs.are_several_for(asset.density.as_ref());
+        (self.fresnel, self.boundary_order, self.heterogeneous, self.slabs.are_several())
+            == (asset.info.ior != 1.0, boundary_order, asset.density.is_some(), several)
     }
 
     /// The code that the material needs.

@@ -107,6 +107,11 @@ impl GpuRenderer {
         self.renderer.asset.mesh.len()
     }
 
+    /// Slabs that the density grid is cut into, likewise.
+    pub fn grid_slabs(&self) -> usize {
+        self.renderer.asset.slabs.count()
+    }
+
     /// Parts that the samples are cut into; more than one where they are too many for the adapter's bindings.
     pub fn shards(&self) -> usize {
         self.renderer.asset.shards.len()

@@ -35,6 +35,7 @@ mod readback;
 pub mod rivals;
 mod shaders;
 mod shard;
+mod slabs;
 mod splatting;
 mod targets;
 mod tiles;

@@ -106,7 +106,7 @@ impl Pipeline {
             surface: Surface::new(device, &common),
             boundary: asset.fresnel.then(|| Boundary::new(device, &common)),
             segments: Segments::new(device, &common, &asset),
-            profile: asset.heterogeneous.then(|| Profile::new(device, &common)),
+            profile: asset.heterogeneous.then(|| Profile::new(device, &common, &asset)),
             outlines: Outlines::new(device, &common, path),
             batches: Batches::new(device, &common, path),
             splatting: Splatting::new(device, &common, &asset, path, workgroups > 0),

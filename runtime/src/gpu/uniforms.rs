@@ -154,7 +154,7 @@ pub(super) struct MediumUniform {
     pub grid_max: Vec3,
     pub ior: f32,
     pub grid_size: [u32; 3],
-    pub triangles: u32,
+    pub grid_layers: u32,
     pub means: Vec3,
     pub most_extinction: f32,
     pub steepest: f32,
@@ -186,7 +186,7 @@ impl MediumUniform {
             grid_max: grid.map_or(Vec3::ONE, |g| g.max.into()),
             ior: info.ior as f32,
             grid_size: grid.map_or([1; 3], |g| g.size),
-            triangles: asset.mesh_triangles.len() as u32,
+            grid_layers: grid.map_or(1, |g| g.size[2]),
             steepest: STEEPEST / sharpness,
             ..Self::zeroed()
         };
@@ -354,7 +354,7 @@ mod tests {
             grid_max,
             ior,
             grid_size,
-            triangles,
+            grid_layers,
             means,
             most_extinction,
             steepest,

@@ -4,7 +4,29 @@ const SUBSTEPS: u32 = 2u;
 
 @group(1) @binding(0) var<storage, read> piece: array<vec4f>;
 @group(1) @binding(1) var<storage, read_write> profile: array<vec4f>;
-@group(1) @binding(2) var<storage, read> grid: array<u32>; // two 16-bit floats: density, its scattering part
+// The grid, cut along z into as many slabs as bindings ask for.
+@group(1) @binding(2) var<storage, read> slab_0: array<u32>;
+@group(1) @binding(3) var<storage, read> slab_1: array<u32>;
+@group(1) @binding(4) var<storage, read> slab_2: array<u32>;
+@group(1) @binding(5) var<storage, read> slab_3: array<u32>;
+@group(1) @binding(6) var<storage, read> slab_4: array<u32>;
+@group(1) @binding(7) var<storage, read> slab_5: array<u32>;
+
+override SLABS: bool = false; // there is more than one
+
+fn voxel_bits(place: u32, slab: u32) -> u32 {
+    if (SLABS) {
+        switch slab {
+            case 1u: { return slab_1[place]; }
+            case 2u: { return slab_2[place]; }
+            case 3u: { return slab_3[place]; }
+            case 4u: { return slab_4[place]; }
+            case 5u: { return slab_5[place]; }
+            default: {}
+        }
+    }
+    return slab_0[place];
+}
 
 @compute @workgroup_size(8, 8)
 fn march(@builtin(global_invocation_id) pixel: vec3u) {

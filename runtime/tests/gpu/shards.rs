@@ -4,12 +4,14 @@
 use super::objects::{Object, ball, torus, uneven_grid};
 use super::scenes::{self, level, outside, scene};
 use super::{gpu, gpu_with};
-use diaphane_formats::asset::Asset;
+use diaphane_formats::asset::{Asset, DensityGrid};
+use diaphane_formats::directions::hash;
 use diaphane_runtime::exact::{DepthTracer, ExactDepths};
 use diaphane_runtime::frame::Frame;
 use diaphane_runtime::gpu::{GpuDevice, GpuRenderer, SplatPath, instance};
 use diaphane_runtime::rendered::Rendered;
 use diaphane_runtime::{Error, Result};
+use half::f16;
 
 /// Holds the spokes of 4,681 samples.
 const MEBIBYTE: u64 = 1 << 20;
@@ -132,6 +134,26 @@ fn a_mesh_in_parts_is_the_same_picture() {
         println!("{name}: {} parts", cut.mesh_parts());
         assert!(got.picture == expected.picture && got.counters == expected.counters, "{name}");
     }
+}
+
+#[test]
+fn a_grid_in_slabs_is_the_same_picture() {
+    let size = [72u32, 70, 80];
+    let value = |i: u64| {
+        let density = 0.3 + 1.6 * (hash(11, i) >> 40) as f32 / (1u64 << 24) as f32;
+        [f16::from_f32(density), f16::from_f32(0.7 * density)]
+    };
+    let values = (0..size.iter().map(|n| u64::from(*n)).product()).map(value).collect();
+    let density = Some(DensityGrid { size, min: [-1.1; 3], max: [1.1; 3], values });
+    let asset = Object { spacing: 0.25, density, ..ball() }.build();
+    let Some(mut whole) = gpu(&asset) else { return };
+    let frame = frame(&asset, |_| ());
+    // A slab of 52 layers, and the rest.
+    let mut cut = within(MEBIBYTE, &asset, whole.path()).unwrap();
+    assert_eq!((whole.grid_slabs(), cut.grid_slabs(), cut.tiles(), cut.shards()), (1, 2, 0, 1));
+    let (got, expected) = (cut.render(&frame, None).unwrap(), whole.render(&frame, None).unwrap());
+    assert_eq!(cut.tiles(), 1);
+    assert!(difference(&got, &expected) == 0.0 && got.counters == expected.counters);
 }
 
 #[test]

@@ -27,7 +27,12 @@ struct Settings {
 // Three a triangle: position; bit k of the first one's w says that edge k runs from the lower to the higher vertex.
 @group(1) @binding(1) var<storage, read> corners: array<vec4f>;
 @group(1) @binding(2) var<storage, read> lights: array<Light>;
-@group(1) @binding(3) var<storage, read> grid: array<u32>; // two 16-bit floats: density, its scattering part
+@group(1) @binding(3) var<storage, read> grid: array<u32>; // one slab; see shared/density.wgsl
+
+fn voxel_bits(place: u32, slab: u32) -> u32 {
+    return grid[place];
+}
+
 @group(1) @binding(4) var<uniform> settings: Settings;
 
 override HETEROGENEOUS: bool = false;

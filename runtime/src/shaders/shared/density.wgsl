@@ -1,7 +1,9 @@
 // Density and its scattering part at a point, trilinear between voxels. Twin of `asset::DensityGrid::value`. The including
-// shader declares `grid`, two 16-bit floats a voxel.
+// shader declares `voxel_bits`: a voxel, two 16-bit floats, by its number in its slab and the slab's.
 fn voxel(x: u32, y: u32, z: u32) -> vec2f {
-    return unpack2x16float(grid[(z * medium.grid_size.y + y) * medium.grid_size.x + x]);
+    let slab = z / medium.grid_layers;
+    let layer = z - slab * medium.grid_layers;
+    return unpack2x16float(voxel_bits((layer * medium.grid_size.y + y) * medium.grid_size.x + x, slab));
 }
 
 fn density(p: vec3f) -> vec2f {

@@ -13,7 +13,7 @@ struct Medium {
     grid_max: vec3f,
     ior: f32,
     grid_size: vec3u,
-    triangles: u32,
+    grid_layers: u32,       // of a slab of the grid, along z
     means: vec3f,           // s of formats/src/slopes.rs for baked light
     most_extinction: f32,   // the largest channel's, at density 1
     steepest: f32,          // largest slope per unit of sharpness
