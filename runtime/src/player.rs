@@ -57,6 +57,8 @@ pub struct Player {
     tracer: DepthTracer,
     /// Where depths are spread over frames.
     spread: Option<Spread>,
+    /// Whether somebody has been asked to trace in place of the CPU.
+    asked: bool,
     reuse: bool,
     counting: bool,
     last: Option<(Frame, LightMode, Rendered)>,
@@ -87,6 +89,7 @@ impl Player {
             info: asset.info.clone(),
             tracer,
             spread: None,
+            asked: false,
             reuse: false,
             counting: false,
             last: None,
@@ -163,11 +166,22 @@ impl Player {
     /// An asset whose mesh or medium makes no sense.
     pub fn spread(&mut self, asset: &Asset, settings: Option<Settings>) -> Result<()> {
         self.spread = settings.map(|s| Spread::new(asset, s)).transpose()?;
+        self.asked = false;
         if let Some(spread) = &mut self.spread {
             spread.set_material(&self.info);
         }
         self.last = None;
         Ok(())
+    }
+
+    /// Has the GPU trace exact depths, which hardware does by itself as soon as a light asks for them, and a software adapter
+    /// only when told to: it is slower than the CPU. Says whether it does; it does not where there is none, the medium is uneven,
+    /// shells overlap, or it finds other depths than the CPU.
+    pub fn trace_on_gpu(&mut self) -> bool {
+        self.asked = true;
+        let Engine::Gpu(gpu) = &self.engine else { return false };
+        let spread = self.spread.as_mut().map(|s| s.use_gpu(gpu.owned()));
+        spread.unwrap_or_else(|| self.tracer.use_gpu(gpu.owned()))
     }
 
     /// Whether the next frames will differ from the last one although nothing moves.
@@ -287,6 +301,7 @@ impl Player {
     fn replace(&mut self, engine: Engine) {
         self.engine = engine;
         self.last = None;
+        self.asked = false;
         self.set_reuse(self.reuse);
         self.set_counting(self.counting);
         match &mut self.engine {
@@ -298,6 +313,10 @@ impl Player {
 
     /// The exact depths that `mode` asks for, `None` when the baked ones serve all lights; and what they cost.
     fn exact(&mut self, frame: &Frame, mode: LightMode) -> (Option<ExactDepths>, ExactReport) {
+        let hardware = matches!(&self.engine, Engine::Gpu(gpu) if !is_software(gpu));
+        if hardware && !self.asked && mode != LightMode::Baked {
+            self.trace_on_gpu();
+        }
         if let Some(spread) = &mut self.spread {
             let exact = spread.advance(frame, mode);
             return ((!exact.is_empty()).then_some(exact), spread.report().clone());

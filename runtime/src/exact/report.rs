@@ -19,6 +19,8 @@ pub struct ExactReport {
     pub milliseconds: f64,
     /// Samples times lights traced in this frame.
     pub rays: u64,
+    /// Whether a GPU traced.
+    pub on_gpu: bool,
     /// Speed of the latest portions; 0 before the first one.
     pub rays_per_second: f64,
     /// Memory of the depths that are kept.

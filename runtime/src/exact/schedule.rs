@@ -174,6 +174,11 @@ impl Schedule {
         self.busy
     }
 
+    /// Notes who traced in the last frame.
+    pub fn set_on_gpu(&mut self, on_gpu: bool) {
+        self.report.on_gpu = on_gpu;
+    }
+
     /// What the last frame was like.
     pub fn report(&self) -> &ExactReport {
         &self.report

@@ -5,6 +5,7 @@ use super::{DepthTracer, ExactDepths, ExactReport};
 use crate::Result;
 use crate::fold::reach;
 use crate::frame::Frame;
+use crate::gpu::GpuDevice;
 use crate::player::LightMode;
 use diaphane_formats::asset::{Asset, Info};
 
@@ -75,12 +76,19 @@ impl Spread {
         if mode != LightMode::Baked {
             frame.lights_inside(&self.info).into_iter().for_each(|i| wishes[i] = Wish::AtOnce);
         }
-        self.schedule.advance(&frame.lights, &wishes, &mut (&self.tracer, frame.least_distance))
+        let exact = self.schedule.advance(&frame.lights, &wishes, &mut (&self.tracer, frame.least_distance));
+        self.schedule.set_on_gpu(self.tracer.is_on_gpu());
+        exact
     }
 
     /// Whether the next frames will differ from the last one although nothing moves.
     pub fn is_busy(&self) -> bool {
         self.schedule.is_busy()
+    }
+
+    /// Traces on a GPU from now on, see [`DepthTracer::use_gpu`].
+    pub fn use_gpu(&mut self, device: &GpuDevice) -> bool {
+        self.tracer.use_gpu(device)
     }
 
     /// What the last frame was like.

@@ -5,20 +5,26 @@ use super::schedule::{Place, Portion, Work, place};
 use super::{Depths, ExactDepths, ExactReport, Known};
 use crate::Result;
 use crate::cpu::lighting::Lighting;
-use crate::frame::{Frame, FrameLight};
+use crate::frame::{Frame, FrameLight, frame_light};
+use crate::gpu::{GpuDepths, GpuDevice};
 use diaphane_formats::asset::{Asset, Info, Samples};
 use diaphane_formats::medium::Medium;
 use diaphane_formats::mesh::Mesh;
+use diaphane_formats::scene::Light;
 use diaphane_formats::visibility::{Accel, depth_along};
 use glam::{DVec3, Vec3};
 use half::f16;
 use rayon::prelude::*;
 use std::ops::Range;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 
 /// Every so manieth sample tells the error where a light is traced at once.
 const CHECKED: usize = 16;
+
+/// Samples with which a GPU is checked.
+const CHECK: usize = 512;
 
 /// Samples of a task.
 const TASK: usize = 64;
@@ -28,6 +34,8 @@ struct Geometry {
     mesh: Mesh,
     medium: Medium,
     accel: OnceLock<Accel>,
+    /// Whether the density is the same everywhere.
+    even: bool,
 }
 
 /// Where rays begin; all objects of a level share it.
@@ -44,8 +52,16 @@ pub struct DepthTracer {
     info: Info,
     /// Baked light, to compare with; objects of the same material share it.
     lighting: Arc<OnceLock<Lighting>>,
+    /// Who traces in place of the CPU.
+    gpu: Option<Traces>,
     traced: Vec<Traced>,
     report: ExactReport,
+}
+
+/// A GPU that traces until it fails.
+struct Traces {
+    depths: GpuDepths,
+    failed: AtomicBool,
 }
 
 /// A light of the call before.
@@ -61,7 +77,8 @@ impl DepthTracer {
     /// # Errors
     /// An asset whose mesh or medium makes no sense.
     pub fn new(asset: &Asset) -> Result<Self> {
-        let geometry = Geometry { mesh: asset.mesh()?, medium: asset.medium()?, accel: OnceLock::new() };
+        let (mesh, medium, even) = (asset.mesh()?, asset.medium()?, asset.density.is_none());
+        let geometry = Geometry { mesh, medium, accel: OnceLock::new(), even };
         Ok(Self::on(Arc::new(geometry), asset))
     }
 
@@ -72,6 +89,7 @@ impl DepthTracer {
             level: Arc::new(Level { samples: asset.samples.clone(), places }),
             info: asset.info.clone(),
             lighting: Arc::default(),
+            gpu: None,
             traced: Vec::new(),
             report: ExactReport::default(),
         }
@@ -89,6 +107,7 @@ impl DepthTracer {
             level: Arc::clone(&self.level),
             info: self.info.clone(),
             lighting: Arc::clone(&self.lighting),
+            gpu: None,
             traced: Vec::new(),
             report: ExactReport::default(),
         }
@@ -107,6 +126,48 @@ impl DepthTracer {
             // Others keep theirs.
             None => self.lighting = Arc::default(),
         }
+    }
+
+    /// Traces on a GPU from now on where it can (the density is even and no shells overlap) and finds what the CPU finds for some
+    /// samples and lights. Says whether it does.
+    pub fn use_gpu(&mut self, device: &GpuDevice) -> bool {
+        self.gpu = None;
+        if !self.geometry.even {
+            return false;
+        }
+        let Some(depths) = GpuDepths::new(device, &self.geometry.mesh, &self.info, &self.level.places) else {
+            return false;
+        };
+        self.gpu = Some(Traces { depths, failed: AtomicBool::new(false) });
+        if !self.agrees() {
+            log::warn!("the GPU finds other depths than the CPU, which traces them");
+            self.gpu = None;
+        }
+        self.is_on_gpu()
+    }
+
+    /// Whether a GPU traces.
+    pub fn is_on_gpu(&self) -> bool {
+        self.gpu.as_ref().is_some_and(|g| !g.failed.load(Ordering::Relaxed))
+    }
+
+    /// Whether the GPU finds the depths of some samples as the CPU does: all but those that run along faces.
+    fn agrees(&self) -> bool {
+        let reach = Vec3::from(self.info.bounds[1]).abs().max(Vec3::from(self.info.bounds[0]).abs());
+        let most = 1e-4 * self.info.diagonal();
+        let far = Light::Directional { direction: DVec3::new(0.36, -0.8, 0.48), irradiance: DVec3::ONE };
+        let place = reach.as_dvec3() * DVec3::new(1.5, 2.0, -1.7);
+        let near = Light::Point { position: place, intensity: DVec3::ONE };
+        let range = 0..self.level.places.len().min(CHECK);
+        [far, near].iter().all(|light| {
+            let light = frame_light(light, DVec3::ZERO);
+            let gpu = self.depths(&light, 0.0, range.clone());
+            let cpu = self.depths_on_cpu(&light, 0.0, range.clone());
+            let same =
+                |(a, b): &(&[f32; 2], &[f32; 2])| (a[0] - b[0]).abs() <= most && (a[1] - b[1]).abs() <= 1e-3;
+            let count = gpu.iter().zip(&cpu).filter(same).count();
+            self.is_on_gpu() && (range.len() - count) * 50 <= range.len()
+        })
     }
 
     /// Builds what the first light would have to wait for.
@@ -140,6 +201,7 @@ impl DepthTracer {
         report.exact = lights.iter().flatten().count();
         report.baked = lights.len() - report.exact;
         report.bytes = (report.exact * self.level.places.len() * size_of::<[f32; 2]>()) as u64;
+        report.on_gpu = self.is_on_gpu();
         report.rays_per_second = report.rays as f64 * 1e3 / report.milliseconds.max(1e-3);
         self.report = report;
         self.traced = kept;
@@ -175,6 +237,24 @@ impl DepthTracer {
     }
 
     fn depths(&self, light: &FrameLight, least: f32, range: Range<usize>) -> Vec<[f32; 2]> {
+        let gpu = self.gpu.as_ref().filter(|_| self.is_on_gpu());
+        match gpu.map(|gpu| gpu.depths.trace(light, range.clone())) {
+            Some(Ok(mut found)) => {
+                for (i, depth) in range.zip(&mut found).filter(|(_, depth)| !(depth[0] >= 0.0)) {
+                    *depth = self.depths_on_cpu(light, least, i..i + 1)[0];
+                }
+                return found;
+            }
+            Some(Err(error)) => {
+                log::warn!("the GPU traces no more depths ({error}); the CPU does");
+                gpu.iter().for_each(|g| g.failed.store(true, Ordering::Relaxed));
+            }
+            None => {}
+        }
+        self.depths_on_cpu(light, least, range)
+    }
+
+    fn depths_on_cpu(&self, light: &FrameLight, least: f32, range: Range<usize>) -> Vec<[f32; 2]> {
         let accel = self.accel();
         let trace = |scratch: &mut Vec<_>, x: &Vec3| {
             let (to, distance, _) = light.at(*x, least);

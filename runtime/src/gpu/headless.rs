@@ -58,6 +58,11 @@ impl GpuRenderer {
         &self.name
     }
 
+    /// The device with its queue.
+    pub(crate) fn owned(&self) -> &GpuDevice {
+        &self.owned
+    }
+
     /// The device that it draws with.
     pub fn device(&self) -> &Device {
         &self.owned.device

@@ -76,6 +76,8 @@ macro_rules! rival {
             "shared/light",
             "shared/phase",
             "shared/density",
+            "shared/fresnel",
+            "shared/hierarchy",
             "rivals/rays",
             $end
         )
@@ -83,6 +85,8 @@ macro_rules! rival {
 }
 pub(super) const RIVAL_MARCH: &str = rival!("rivals/march");
 pub(super) const RIVAL_FILL: &str = rival!("rivals/fill");
+pub(super) const DEPTHS: &str =
+    source!("shared/view", "shared/medium", "shared/fresnel", "shared/hierarchy", "depths");
 pub(super) const PUBLISH: &str = source!("shared/view", "publish");
 pub(super) const DISPLAY: &str = source!("shared/whole", "display");
 

@@ -1,11 +1,11 @@
 //! Exact depths of a host's lights.
 
 use super::host::{FORMAT, Host, device, host_frame, peak};
-use super::objects::{Object, ball};
-use super::scenes::{outside, scene};
+use super::objects::{Object, ball, torus};
+use super::scenes::{outside, put_light_inside, scene};
 use diaphane_formats::asset::Asset;
 use diaphane_formats::scene::{Light, Scene};
-use diaphane_runtime::exact::Settings;
+use diaphane_runtime::exact::{DepthTracer, Settings};
 use diaphane_runtime::frame::Frame;
 use diaphane_runtime::gpu::{GpuDevice, Options};
 use diaphane_runtime::placement::Placement;
@@ -103,4 +103,69 @@ fn objects_share_the_time_of_a_frame() {
     // The first portion of the first object takes all of it.
     assert_eq!((report.exact, report.waiting), (0, 3));
     assert!(report.rays > 0 && report.rays <= 256, "{report:?}");
+}
+
+#[test]
+fn a_gpu_traces_the_depths_that_the_cpu_traces() {
+    let glassy = Object { ior: 1.4, spacing: 0.12, ..ball() };
+    for (name, object) in [("torus", Object { spacing: 0.08, ..torus() }), ("glassy ball", glassy)] {
+        let mut asset = object.build();
+        asset.info.uniform_density = 0.7;
+        let Some(gpu) = device() else { return };
+        let mut cpu = DepthTracer::new(&asset).unwrap();
+        let mut other = DepthTracer::new(&asset).unwrap();
+        assert!(other.use_gpu(&gpu), "{name}");
+        let mut scene = scene(outside());
+        put_light_inside(&mut scene);
+        let frame = Frame::new(&scene, &asset.info).unwrap();
+        let all: Vec<usize> = (0..frame.lights.len()).collect();
+        let (expected, got) = (cpu.trace(&frame, &all), other.trace(&frame, &all));
+        assert!(other.report().on_gpu && !cpu.report().on_gpu);
+        for light in all {
+            let (expected, got) = (expected.light(light).unwrap(), got.light(light).unwrap());
+            let mut off: Vec<[f32; 2]> =
+                expected.iter().zip(got).map(|(a, b)| [(a[0] - b[0]).abs(), (a[1] - b[1]).abs()]).collect();
+            off.sort_by(|a, b| a[0].total_cmp(&b[0]));
+            let (most, longest) = (off[off.len() - 1][0], expected.iter().map(|d| d[0]).fold(0.0, f32::max));
+            println!("{name}, light {light}: {most:.1e} of {longest:.2}");
+            assert!(longest > 0.1 && most < 2e-5 * longest, "{name}, light {light}: {most}");
+            // Through an edge a ray meets either face.
+            let other_face = off.iter().filter(|d| d[1] > 1e-4).count();
+            assert!(other_face * 200 < off.len(), "{name}, light {light}: {other_face}");
+        }
+    }
+}
+
+#[test]
+fn a_gpu_that_cannot_trace_leaves_it_to_the_cpu() {
+    let Some(gpu) = device() else { return };
+    let uneven = Object { density: Some(super::uneven_grid()), spacing: 0.3, ..ball() }.build();
+    assert!(!DepthTracer::new(&uneven).unwrap().use_gpu(&gpu));
+    let asset = Object { spacing: 0.3, ..ball() }.build();
+    let mut tracer = DepthTracer::new(&asset).unwrap();
+    assert!(tracer.use_gpu(&gpu));
+    let frame = Frame::new(&near_light(), &asset.info).unwrap();
+    gpu.device.destroy();
+    let traced = tracer.trace(&frame, &[0]);
+    assert!(!tracer.is_on_gpu());
+    let expected = DepthTracer::new(&asset).unwrap().trace(&frame, &[0]);
+    assert_eq!(traced.light(0), expected.light(0));
+}
+
+#[test]
+fn a_picture_with_depths_from_the_gpu_is_the_same() {
+    let asset = Object { order: 3, ..ball() }.build();
+    if device().is_none() {
+        return;
+    }
+    let scene = near_light();
+    let exact = expected(&asset, &scene);
+    let mut player = Player::new(&asset, Backend::Gpu).unwrap();
+    assert!(player.trace_on_gpu());
+    let frame = Frame::new(&scene, &asset.info).unwrap();
+    let rendered = player.render(&frame, LightMode::Exact).unwrap();
+    assert!(rendered.exact.on_gpu);
+    let peak = exact.iter().flatten().fold(0.0, |m: f32, v| m.max(*v));
+    let off = exact.iter().flatten().zip(rendered.picture.pixels.iter().flatten());
+    assert!(off.map(|(a, b)| (a - b).abs()).fold(0.0, f32::max) < 1e-4 * peak);
 }

@@ -6,25 +6,25 @@
 //! grid    nodes x lights, by shadow rays -> march that looks the light up, trilinearly
 //! ```
 //!
-//! Shadow rays go through a box hierarchy ([`hierarchy`]) and take every crossing: their depth is exact where the medium is
+//! Shadow rays go through a box hierarchy (`gpu/hierarchy.rs`) and take every crossing: their depth is exact where the medium is
 //! uniform, and a sum of lookups of the density grid, one every [`Settings::stride`] voxels, where it is not. At most the 16
 //! nearest crossings of a camera ray count, and of a shadow ray through a density grid. Compared with shadow rays in f64 by
 //! tests/tests/gpu_rivals.rs.
 
-mod hierarchy;
 mod lattice;
 mod parts;
 mod stage;
 mod uniforms;
 
 use super::device::{GpuDevice, instance};
+use super::frame::most_bound;
+use super::hierarchy::Hierarchy;
 use crate::frame::Frame;
 use crate::{Error, Result};
 use diaphane_formats::asset::Asset;
 use diaphane_formats::mesh::Mesh;
 use diaphane_formats::picture::Picture;
 use diaphane_formats::visibility::Accel;
-use hierarchy::Hierarchy;
 use lattice::Lattice;
 use stage::{Grid, Stage};
 
@@ -75,10 +75,7 @@ impl Rivals {
         let owned = GpuDevice::open(&instance(), None)?;
         let mesh = asset.mesh()?;
         let hierarchy = Hierarchy::new(&asset.mesh_positions, &asset.mesh_triangles);
-        let limits = owned.device.limits();
-        let most = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
-        let largest = 16 * hierarchy.corners.len().max(2 * hierarchy.nodes.len()) as u64;
-        if largest > most || hierarchy.corners.len() >= 3 << 28 {
+        if !hierarchy.fits(most_bound(&owned.device)) {
             return Err(Error::Rival("the mesh has too many triangles for the rivals".to_owned()));
         }
         let stage = Stage::new(&owned, asset, &hierarchy);

@@ -1,6 +1,5 @@
 //! Buffers and passes of the rivals, and the drawing of one picture.
 
-use super::hierarchy::{Hierarchy, Node};
 use super::lattice::Lattice;
 use super::parts::Patience;
 use super::uniforms::{Part, SettingsUniform};
@@ -9,6 +8,7 @@ use crate::frame::Frame;
 use crate::gpu::bindings::{Slot, compute, empty_buffer, filled_buffer, group, layout, pipeline_layout};
 use crate::gpu::device::GpuDevice;
 use crate::gpu::frame::{VIEW_STRIDE, common_layout};
+use crate::gpu::hierarchy::{Hierarchy, Node};
 use crate::gpu::lot::MOST_VIEWS;
 use crate::gpu::tiles::Tile;
 use crate::gpu::uniforms::{LightLayout, LightRecord, MediumUniform, ViewUniform};

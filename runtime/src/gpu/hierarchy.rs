@@ -14,7 +14,7 @@ const PADDING: f32 = 2e-6;
 /// Most triangles of a leaf: four bits hold their number.
 const LEAF: u32 = 8;
 
-/// `Node` of rivals/rays.wgsl.
+/// `Node` of shared/hierarchy.wgsl.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub(super) struct Node {
@@ -32,6 +32,12 @@ pub(super) struct Hierarchy {
 }
 
 impl Hierarchy {
+    /// Whether its bindings hold no more than `most` bytes.
+    pub fn fits(&self, most: u64) -> bool {
+        let largest = 16 * self.corners.len().max(2 * self.nodes.len()) as u64;
+        largest <= most && self.corners.len() < 3 << 28
+    }
+
     /// Of at least one triangle, at most 2^28.
     pub fn new(positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> Self {
         let place = |vertex: u32| Vec3::from(positions[vertex as usize]);
