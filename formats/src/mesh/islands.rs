@@ -5,7 +5,7 @@
 //! vertices are, the strongest agreements first. What is so torn that its holes say more than its faces is left as it is.
 
 use super::pieces::{Pieces, corner, edges, keep_majority};
-use super::{close, loops};
+use super::{close, loops, sheets};
 use glam::DVec3;
 use std::collections::{HashMap, HashSet};
 
@@ -23,6 +23,9 @@ const LONE: f64 = 0.6;
 /// too. Of balls, tori, boxes and birds without half of their faces it is 9 to 12, without three fifths 21 to 44.
 const LOOP: f64 = 20.0;
 const LOOP_GUESSED: f64 = 8.0;
+
+/// Fewer faces are never torn: shares of so few mean nothing.
+pub(super) const FEW: usize = 64;
 
 /// The normals of a piece's faces around an open vertex, weighted with their corners' angles.
 struct Fan {
@@ -58,6 +61,11 @@ pub(super) fn join(positions: &[DVec3], triangles: &mut [[u32; 3]], pieces: &mut
             set.iter().for_each(|p| pieces.torn[*p] = true);
             continue;
         }
+        // A sheet that hangs on something would make a sheet of that.
+        let corners: Vec<[DVec3; 3]> = faces.iter().map(|t| t.map(|v| positions[v as usize])).collect();
+        if !sheets::wraps(&corners) {
+            continue;
+        }
         if !trusted {
             keep_majority(positions, triangles, &mut pieces.turned, &all);
         }
@@ -72,7 +80,7 @@ fn is_torn(positions: &[DVec3], faces: &[[u32; 3]], longest: f64) -> bool {
     let missing = close::missing(faces);
     let all: HashSet<(u32, u32)> =
         faces.iter().flat_map(|t| edges(*t)).map(|(a, b)| (a.min(b), a.max(b))).collect();
-    if missing.len() as f64 <= LONE * all.len() as f64 {
+    if faces.len() < FEW || missing.len() as f64 <= LONE * all.len() as f64 {
         return false;
     }
     let rings = loops::trace(positions, faces, &missing);

@@ -29,10 +29,10 @@ pub(super) fn repair(positions: Vec<DVec3>, triangles: Vec<[u32; 3]>) -> Result<
     let (mut turned, pieces) = oriented(&positions, &mut triangles, &mut report);
     let shells = shells::gather(&mut positions, &triangles, &pieces, &mut report);
     let fates = shells::nest(&shells, &mut report);
-    // Bits of what is torn may have an inside by chance.
+    // Of what is torn, bits may have an inside by chance: open shells of less than half of the faces are no object.
     let solid = || shells.iter().zip(&fates).filter(|(_, fate)| **fate != Fate::Flat).map(|(shell, _)| shell);
     let left: usize = solid().map(|shell| shell.members.len()).sum();
-    if solid().all(|shell| !shell.patches.is_empty()) && 2 * left < faces {
+    if solid().all(|shell| !shell.patches.is_empty()) && faces >= islands::FEW && 2 * left < faces {
         report.mending.sheets += shells.len();
         return Err(no_inside(&report));
     }

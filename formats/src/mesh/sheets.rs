@@ -54,6 +54,11 @@ fn around_itself(faces: &[Corners]) -> f64 {
     0.5 * means_beside(faces, |q| tree.at(q)).iter().sum::<f64>()
 }
 
+/// Whether a piece is more than a sheet.
+pub(super) fn wraps(faces: &[Corners]) -> bool {
+    around_itself(faces).abs() >= WRAPS
+}
+
 /// Says of each triangle whether it belongs to an open sheet.
 pub(super) fn find(
     positions: &[DVec3],
@@ -71,7 +76,7 @@ pub(super) fn find(
     let candidates: Vec<usize> = (0..pieces.members.len())
         .into_par_iter()
         .filter(|p| pieces.open[*p] && !pieces.torn[*p])
-        .filter(|p| around_itself(&faces(*p)).abs() < WRAPS)
+        .filter(|p| !wraps(&faces(*p)))
         .collect();
     if candidates.is_empty() {
         return gone;
