@@ -160,9 +160,9 @@ pub fn run(args: &BenchArgs) -> Result<()> {
     match args.part {
         Part::Axes => {}
         Part::All if backend != "gpu" => {
-            tell(&format!(
-                "note: the rivals need a GPU, a software adapter at least (--backend gpu); they are left out"
-            ));
+            tell(
+                "note: the rivals need a GPU, a software adapter at least (--backend gpu); they are left out",
+            );
         }
         Part::Rivals if backend != "gpu" => {
             bail!("the rivals need a GPU, a software adapter at least: add --backend gpu");
