@@ -2,7 +2,7 @@
 
 use crate::cli::{self, Arguments};
 use crate::inspect::percent;
-use crate::terminal::Bars;
+use crate::terminal::{Bars, say, tell};
 use anyhow::{Context, bail};
 use clap::Parser;
 use diaphane_bake::list;
@@ -50,7 +50,7 @@ pub fn run(arguments: &BatchArguments) -> anyhow::Result<()> {
     let name = arguments.list.display();
     let lines = list::command_lines(&text, folder).with_context(|| format!("'{name}'"))?;
     if arguments.commands {
-        lines.iter().for_each(|line| println!("{}", shell(line)));
+        lines.iter().for_each(|line| say(&shell(line)));
         return Ok(());
     }
     let bakes: Vec<Arguments> = lines
@@ -77,7 +77,7 @@ pub fn run(arguments: &BatchArguments) -> anyhow::Result<()> {
     let (mut summary, mut failed) = (Vec::new(), 0);
     for (i, bake) in bakes.iter().enumerate() {
         if !arguments.quiet {
-            eprintln!("bake {} of {}: {}", i + 1, bakes.len(), bake.output().display());
+            tell(&format!("bake {} of {}: {}", i + 1, bakes.len(), bake.output().display()));
         }
         let start = Instant::now();
         let result = cli::run_bake(bake, &bars);
@@ -87,7 +87,7 @@ pub fn run(arguments: &BatchArguments) -> anyhow::Result<()> {
         failed += usize::from(result.is_err());
         summary.push(line(bake.output(), &result, start.elapsed().as_secs_f64()));
     }
-    summary.iter().for_each(|line| println!("{line}"));
+    summary.iter().for_each(|line| say(line));
     if failed > 0 { Err(SomeFailed { failed, all: bakes.len() }.into()) } else { Ok(()) }
 }
 

@@ -2,7 +2,7 @@
 
 use crate::batch::{self, BatchArguments};
 use crate::inspect;
-use crate::terminal::Bars;
+use crate::terminal::{Bars, say, tell};
 use anyhow::{Context, bail};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use diaphane_bake::params::{Params, Preset, Representation, Visibility};
@@ -199,7 +199,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
             bars.cancel_on_interrupt().context("cannot listen for Ctrl-C")?;
             let report = run_bake(arguments, &bars)?;
             if !arguments.bake.quiet {
-                println!("{}", summary(arguments.output(), &report));
+                say(&summary(arguments.output(), &report));
             }
             Ok(())
         }
@@ -236,13 +236,16 @@ pub fn run_bake(arguments: &Arguments, bars: &Bars) -> anyhow::Result<Report> {
     files::require_writable(output)?;
     let left = files::remove_unfinished(output);
     if left > 0 && !arguments.quiet {
-        eprintln!("note: removed {left} unfinished file(s) of earlier bakes beside '{}'", output.display());
+        tell(&format!(
+            "note: removed {left} unfinished file(s) of earlier bakes beside '{}'",
+            output.display()
+        ));
     }
     let medium = material::load(material_path)?;
     let (mesh, mesh_report) = mesh::load_obj(mesh_path)?;
     if !arguments.quiet {
         for line in mesh_report.warnings() {
-            eprintln!("{}: {line}", mesh_path.display());
+            tell(&format!("{}: {line}", mesh_path.display()));
         }
     }
     let input = Input {
@@ -255,7 +258,7 @@ pub fn run_bake(arguments: &Arguments, bars: &Bars) -> anyhow::Result<Report> {
     let params = arguments.params();
     let needed = memory::required(&input, &params)?;
     if !arguments.quiet {
-        eprintln!("about {} of memory will be needed", memory::megabytes(needed));
+        tell(&format!("about {} of memory will be needed", memory::megabytes(needed)));
     }
     let result = bake(&input, &params, bars);
     bars.finish();
@@ -266,7 +269,7 @@ pub fn run_bake(arguments: &Arguments, bars: &Bars) -> anyhow::Result<Report> {
         files::write_atomically(path, text.as_bytes())?;
     }
     for line in &report.shortfalls {
-        eprintln!("warning: {line}");
+        tell(&format!("warning: {line}"));
     }
     Ok(report)
 }

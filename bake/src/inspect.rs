@@ -1,5 +1,6 @@
 //! `diaphane-bake inspect`.
 
+use crate::terminal::say;
 use diaphane_bake::report;
 use diaphane_formats::asset::{self, Asset, Certificate};
 use diaphane_formats::files;
@@ -13,7 +14,7 @@ pub fn show(path: &Path, as_json: bool) -> anyhow::Result<()> {
     let asset = asset::parse(&bytes).map_err(in_file)?;
     let sections = asset::section_sizes(&bytes).map_err(in_file)?;
     if as_json {
-        println!("{:#}", describe(&asset, &sections, bytes.len()));
+        say(&format!("{:#}", describe(&asset, &sections, bytes.len())));
     } else {
         print_text(path, &asset, &sections, bytes.len());
     }
@@ -65,35 +66,39 @@ pub fn certified(certificate: Option<&Certificate>) -> String {
 fn print_text(path: &Path, asset: &Asset, sections: &[(&'static str, usize)], bytes: usize) {
     let i = &asset.info;
     let p = &i.provenance;
-    println!("{}  {:.2} MB, format {}", path.display(), bytes as f64 / 1e6, asset::FORMAT_VERSION);
-    println!("  made by      {} from {} and {}, seed {}", p.program, p.mesh_name, p.material_name, p.seed);
-    println!(
+    say(&format!("{}  {:.2} MB, format {}", path.display(), bytes as f64 / 1e6, asset::FORMAT_VERSION));
+    say(&format!(
+        "  made by      {} from {} and {}, seed {}",
+        p.program, p.mesh_name, p.material_name, p.seed
+    ));
+    say(&format!(
         "  mesh         {} vertices, {} triangles, diagonal {}",
         p.mesh_report.vertices,
         p.mesh_report.triangles,
         i.diagonal()
-    );
+    ));
     for line in p.mesh_report.warnings() {
-        println!("               {line}");
+        say(&format!("               {line}"));
     }
-    println!("  extinction   {:?} per mesh unit", i.extinction);
-    println!("  albedo       {:?}", i.albedo);
-    println!("  phase        {:?}, ior {}", i.phase, i.ior);
-    match &asset.density {
-        Some(g) => println!("  density      grid of {} x {} x {}", g.size[0], g.size[1], g.size[2]),
-        None => println!("  density      {} everywhere", i.uniform_density),
-    }
-    println!(
+    say(&format!("  extinction   {:?} per mesh unit", i.extinction));
+    say(&format!("  albedo       {:?}", i.albedo));
+    say(&format!("  phase        {:?}, ior {}", i.phase, i.ior));
+    let density = asset.density.as_ref().map_or_else(
+        || format!("{} everywhere", i.uniform_density),
+        |g| format!("grid of {} x {} x {}", g.size[0], g.size[1], g.size[2]),
+    );
+    say(&format!("  density      {density}"));
+    say(&format!(
         "  samples      {} ({} dropped as dark), {} directions, at most {} bands, {:?}, width factor {}",
         i.samples, i.discarded, p.directions, i.order, i.encoding, i.width_factor
-    );
+    ));
     for (k, level) in report::levels(asset).iter().enumerate().skip(1) {
         let error = level.error.map_or(String::new(), |e| format!(", error {:.2} %", 100.0 * e));
-        println!("  level {k:<7}{} samples, width factor {}{error}", level.samples, level.width_factor);
+        say(&format!("  level {k:<7}{} samples, width factor {}{error}", level.samples, level.width_factor));
     }
-    println!("  error        {}", certified(i.certificate.as_ref()));
-    println!("  per sample   {:.1} bytes", bytes_per_sample(asset, sections));
+    say(&format!("  error        {}", certified(i.certificate.as_ref())));
+    say(&format!("  per sample   {:.1} bytes", bytes_per_sample(asset, sections)));
     for (name, size) in sections {
-        println!("    {name:<16} {size:>12} bytes");
+        say(&format!("    {name:<16} {size:>12} bytes"));
     }
 }

@@ -23,7 +23,7 @@ fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             let line = one_line(&format!("{error:#}"));
-            eprintln!("error: {}", line.strip_prefix("error: ").unwrap_or(&line));
+            terminal::tell(&format!("error: {}", line.strip_prefix("error: ").unwrap_or(&line)));
             let failed = matches!(error.downcast_ref(), Some(diaphane_bake::Error::TooInaccurate(_)))
                 || error.is::<batch::SomeFailed>();
             ExitCode::from(if failed { 1 } else { 2 })

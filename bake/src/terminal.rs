@@ -1,10 +1,21 @@
-//! Progress on a terminal: one bar for each stage; plain lines elsewhere.
+//! Progress on a terminal: one bar for each stage; plain lines elsewhere. A reader that goes away (`| head`) is no reason to
+//! fail.
 
 use diaphane_bake::progress::Progress;
 use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
-use std::io::IsTerminal;
+use std::io::{IsTerminal, Write};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+/// A line on standard output.
+pub fn say(line: &str) {
+    let _ = writeln!(std::io::stdout(), "{line}");
+}
+
+/// A line on standard error.
+pub fn tell(line: &str) {
+    let _ = writeln!(std::io::stderr(), "{line}");
+}
 
 /// Bars, or lines, or nothing.
 pub struct Bars {
@@ -76,7 +87,7 @@ impl Progress for Bars {
             bar.set_message(name);
             bar
         } else {
-            eprintln!("{name} ...");
+            tell(&format!("{name} ..."));
             ProgressBar::hidden()
         };
         stages.current = stages.bars.len();

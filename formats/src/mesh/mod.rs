@@ -1,7 +1,10 @@
 //! Triangle meshes: reading OBJ, repairing what can be repaired, and saying what was found.
 
 mod close;
+mod fill;
+mod islands;
 mod load;
+mod loops;
 mod pieces;
 mod repair;
 mod report;

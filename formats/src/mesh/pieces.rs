@@ -9,6 +9,13 @@ pub(super) fn edges(t: [u32; 3]) -> [(u32, u32); 3] {
     [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])]
 }
 
+/// The unit normal of a triangle times the angle of its corner `k`; 0 where it has no area.
+pub(super) fn corner(positions: &[DVec3], t: [u32; 3], k: usize) -> DVec3 {
+    let [a, b, c] = [0, 1, 2].map(|i| positions[t[(k + i) % 3] as usize]);
+    let normal = (b - a).cross(c - a);
+    normal.normalize_or_zero() * normal.length().atan2((b - a).dot(c - a))
+}
+
 /// Which triangle belongs where.
 pub(super) struct Pieces {
     /// Triangles of each piece.
@@ -17,12 +24,14 @@ pub(super) struct Pieces {
     pub one_sided: Vec<bool>,
     /// Pieces that are not closed by themselves.
     pub open: Vec<bool>,
+    /// Pieces of islands that are too torn to be joined.
+    pub torn: Vec<bool>,
     /// Edges of a single triangle.
     pub lone_edges: Vec<(u32, u32)>,
     /// Triangles that were turned.
     pub turned: Vec<bool>,
     /// Edges shared by more than two triangles.
-    pub non_manifold_edges: usize,
+    pub crowded_edges: Vec<(u32, u32)>,
 }
 
 /// Makes neighbours agree in winding, breadth first over edges shared by two triangles.
@@ -33,16 +42,20 @@ pub(super) fn orient(positions: &[DVec3], triangles: &mut [[u32; 3]]) -> Pieces 
             users.entry((a.min(b), a.max(b))).or_default().push(i as u32);
         }
     }
-    let mut lone_edges: Vec<(u32, u32)> =
-        users.iter().filter(|(_, u)| u.len() == 1).map(|(edge, _)| *edge).collect();
-    lone_edges.sort_unstable();
+    let used = |is: fn(usize) -> bool| {
+        let mut found: Vec<(u32, u32)> =
+            users.iter().filter(|(_, u)| is(u.len())).map(|(edge, _)| *edge).collect();
+        found.sort_unstable();
+        found
+    };
     let mut pieces = Pieces {
         members: Vec::new(),
         one_sided: Vec::new(),
         open: Vec::new(),
-        lone_edges,
+        torn: Vec::new(),
+        lone_edges: used(|n| n == 1),
         turned: vec![false; triangles.len()],
-        non_manifold_edges: users.values().filter(|u| u.len() > 2).count(),
+        crowded_edges: used(|n| n > 2),
     };
     let mut reached = vec![false; triangles.len()];
     for seed in 0..triangles.len() {
@@ -78,12 +91,18 @@ pub(super) fn orient(positions: &[DVec3], triangles: &mut [[u32; 3]]) -> Pieces 
         pieces.open.push((one_sided || !paired) && is_open(triangles, &members));
         pieces.members.push(members);
         pieces.one_sided.push(one_sided);
+        pieces.torn.push(false);
     }
     pieces
 }
 
 /// If most of a piece's area had to be turned, the seed was the wrong one: undo.
-fn keep_majority(positions: &[DVec3], triangles: &mut [[u32; 3]], turned: &mut [bool], members: &[u32]) {
+pub(super) fn keep_majority(
+    positions: &[DVec3],
+    triangles: &mut [[u32; 3]],
+    turned: &mut [bool],
+    members: &[u32],
+) {
     let area = |t: [u32; 3]| {
         let [a, b, c] = t.map(|i| positions[i as usize]);
         (b - a).cross(c - a).length()
@@ -105,10 +124,20 @@ fn keep_majority(positions: &[DVec3], triangles: &mut [[u32; 3]], turned: &mut [
 }
 
 impl Pieces {
+    /// Forgets pieces without triangles.
+    pub fn drop_empty(&mut self) {
+        let full: Vec<bool> = self.members.iter().map(|own| !own.is_empty()).collect();
+        for flags in [&mut self.one_sided, &mut self.open, &mut self.torn] {
+            let mut full = full.iter();
+            flags.retain(|_| full.next() == Some(&true));
+        }
+        self.members.retain(|own| !own.is_empty());
+    }
+
     /// Counts what was found, of the pieces as they came.
     pub fn describe(&self, report: &mut MeshReport) {
         report.components = self.members.len();
-        report.non_manifold_edges = self.non_manifold_edges;
+        report.non_manifold_edges = self.crowded_edges.len();
     }
 }
 

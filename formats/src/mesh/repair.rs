@@ -1,14 +1,14 @@
 //! From raw triangles to a closed mesh.
 //!
 //! ```text
-//! weld ─ clean ─ pieces that agree in winding (seams mended if open) ─ sheets dropped ─ shells closed ─ shells turned or dropped
+//! weld ─ clean ─ pieces that agree in winding (seams mended if open) ─ islands joined ─ sheets dropped ─ shells closed ─ shells turned or dropped
 //! ```
 //!
 //! A clean mesh comes out as it was. What is inside is decided by winding numbers ([`super::winding`]).
 
 use super::pieces::{self, Pieces};
 use super::shells::{self, Fate};
-use super::{Mesh, MeshReport, seams, self_intersection, sheets, weld};
+use super::{Mesh, MeshReport, islands, seams, self_intersection, sheets, weld};
 use crate::{Error, Result};
 use glam::DVec3;
 
@@ -25,9 +25,17 @@ pub(super) fn repair(positions: Vec<DVec3>, triangles: Vec<[u32; 3]>) -> Result<
     if triangles.is_empty() {
         return Err(Error::invalid("has only triangles without area; a closed mesh with volume is needed"));
     }
+    let faces = triangles.len();
     let (mut turned, pieces) = oriented(&positions, &mut triangles, &mut report);
     let shells = shells::gather(&mut positions, &triangles, &pieces, &mut report);
     let fates = shells::nest(&shells, &mut report);
+    // Of what is torn, bits may have an inside by chance: open shells of less than half of the faces are no object.
+    let solid = || shells.iter().zip(&fates).filter(|(_, fate)| **fate != Fate::Flat).map(|(shell, _)| shell);
+    let left: usize = solid().map(|shell| shell.members.len()).sum();
+    if solid().all(|shell| !shell.patches.is_empty()) && faces >= islands::FEW && 2 * left < faces {
+        report.mending.sheets += shells.len();
+        return Err(no_inside(&report));
+    }
     // Members in their old order, patches after them.
     let mut kept = vec![false; triangles.len()];
     let mut patches = Vec::new();
@@ -83,6 +91,7 @@ fn oriented(
         *triangles = mended;
         pieces = pieces::orient(positions, triangles);
     }
+    islands::join(positions, triangles, &mut pieces);
     pieces.describe(report);
     let mut turned = std::mem::take(&mut pieces.turned);
     loop {
@@ -94,6 +103,7 @@ fn oriented(
         let mut gone = gone.iter();
         turned.retain(|_| gone.next() == Some(&false));
         pieces = pieces::orient(positions, triangles);
+        islands::join(positions, triangles, &mut pieces);
         turned.iter_mut().zip(&pieces.turned).for_each(|(all, now)| *all ^= now);
     }
 }

@@ -23,7 +23,7 @@ pub struct MeshReport {
     pub non_manifold_edges: usize,
     /// Edges without a partner.
     pub open_edges: usize,
-    /// Holes that were closed with a fan of triangles.
+    /// Holes that were closed.
     pub holes: usize,
     /// Connected pieces.
     pub components: usize,
@@ -105,8 +105,7 @@ impl MeshReport {
             "pairs of triangles cross each other; where shells overlap the medium counts once",
         );
         if self.holes > 0 {
-            lines
-                .push(format!("{} holes ({} open edges) were closed with fans", self.holes, self.open_edges));
+            lines.push(format!("{} holes ({} open edges) were closed", self.holes, self.open_edges));
         }
         if self.objects > 1 {
             lines.push(format!("{} objects were merged into one", self.objects));

@@ -4,7 +4,7 @@
 //! sheet has 0. What an open piece has on average tells how far it is from being closed. A piece near 0 is still needed
 //! if the others wrap around half of it, as the last face does that a box lacks; it is not if it stands outside the others
 //! (fins) or inside them (walls), where they wrap around none or all of it, nor if they have another face in the same place,
-//! which leaves all of it on one side and nothing on the other.
+//! which leaves all of it on one side and nothing on the other. Torn islands are sheets.
 
 use super::MeshReport;
 use super::pieces::Pieces;
@@ -54,6 +54,11 @@ fn around_itself(faces: &[Corners]) -> f64 {
     0.5 * means_beside(faces, |q| tree.at(q)).iter().sum::<f64>()
 }
 
+/// Whether a piece is more than a sheet.
+pub(super) fn wraps(faces: &[Corners]) -> bool {
+    around_itself(faces).abs() >= WRAPS
+}
+
 /// Says of each triangle whether it belongs to an open sheet.
 pub(super) fn find(
     positions: &[DVec3],
@@ -63,12 +68,16 @@ pub(super) fn find(
 ) -> Vec<bool> {
     let corners = |t: u32| triangles[t as usize].map(|v| positions[v as usize]);
     let faces = |piece: usize| pieces.members[piece].iter().map(|t| corners(*t)).collect::<Vec<_>>();
+    let mut gone = vec![false; triangles.len()];
+    for p in (0..pieces.members.len()).filter(|p| pieces.torn[*p]) {
+        pieces.members[p].iter().for_each(|t| gone[*t as usize] = true);
+        report.mending.sheets += 1;
+    }
     let candidates: Vec<usize> = (0..pieces.members.len())
         .into_par_iter()
-        .filter(|p| pieces.open[*p])
-        .filter(|p| around_itself(&faces(*p)).abs() < WRAPS)
+        .filter(|p| pieces.open[*p] && !pieces.torn[*p])
+        .filter(|p| !wraps(&faces(*p)))
         .collect();
-    let mut gone = vec![false; triangles.len()];
     if candidates.is_empty() {
         return gone;
     }

@@ -57,8 +57,8 @@ impl Workbench {
         std::fs::write(self.path(name), contents).unwrap();
     }
 
-    /// Runs `diaphane-PROGRAM` in the folder; `None` (said once) where that program was not built with the tests.
-    pub fn run(&self, program: &str, arguments: &[&str]) -> Option<Output> {
+    /// `diaphane-PROGRAM` in the folder; `None` (said once) where that program was not built with the tests.
+    pub fn command(&self, program: &str, arguments: &[&str]) -> Option<Command> {
         let validate = Path::new(env!("CARGO_BIN_EXE_diaphane-validate"));
         let name = format!("diaphane-{program}{}", std::env::consts::EXE_SUFFIX);
         let path = validate.with_file_name(&name);
@@ -66,7 +66,14 @@ impl Workbench {
             tell(&format!("skipped: {name} is not built; test with --workspace"));
             return None;
         }
-        Some(Command::new(path).current_dir(self.folder.path()).args(arguments).output().unwrap())
+        let mut command = Command::new(path);
+        command.current_dir(self.folder.path()).args(arguments);
+        Some(command)
+    }
+
+    /// Runs [`Workbench::command`].
+    pub fn run(&self, program: &str, arguments: &[&str]) -> Option<Output> {
+        Some(self.command(program, arguments)?.output().unwrap())
     }
 
     /// Every file below the folder with its bytes.

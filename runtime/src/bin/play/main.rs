@@ -11,6 +11,7 @@ use anyhow::Result;
 use args::{Args, Arguments, Command};
 use clap::Parser;
 use diaphane_formats::one_line;
+use std::io::{ErrorKind, Write};
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
@@ -32,12 +33,23 @@ fn main() -> ExitCode {
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,
+        Err(error) if nobody_reads(&error) => ExitCode::SUCCESS,
         Err(error) => {
             let line = one_line(&format!("{error:#}"));
-            eprintln!("error: {}", line.strip_prefix("error: ").unwrap_or(&line));
+            tell(&format!("error: {}", line.strip_prefix("error: ").unwrap_or(&line)));
             ExitCode::from(2)
         }
     }
+}
+
+/// A line on standard error, if anyone reads it.
+fn tell(line: &str) {
+    let _ = writeln!(std::io::stderr(), "{line}");
+}
+
+/// Whether a program ended because whoever read its lines went away (`| head`).
+fn nobody_reads(error: &anyhow::Error) -> bool {
+    error.downcast_ref().is_some_and(|e: &std::io::Error| e.kind() == ErrorKind::BrokenPipe)
 }
 
 /// Panics of libraries about a lost device become errors, which are told in a line of their own.

@@ -50,6 +50,19 @@ fn holes() -> Vec<Kind> {
         kind("a corner missing", Box, count, |t| without(t, |p| p.dot(DVec3::ONE) > 1.6)),
         kind("half of a face missing", Box, count, |t| without(t, |p| p.y > 0.62 && p.x > 0.0)),
         kind("holes in both shells", Hollow, count, |t| pierced(t, 0.01)),
+        kind("a tenth of the faces missing", Ball, count, |t| pierced(t, 0.1)),
+        kind("a fifth of the faces missing", Ball, count, |t| pierced(t, 0.2)),
+        kind("a third of the faces missing", Ball, count, |t| pierced(t, 1.0 / 3.0)),
+        kind("half of the faces missing", Ball, count, |t| pierced(t, 0.5)),
+        kind("a fifth of the faces of a torus missing", Torus, count, |t| pierced(t, 0.2)),
+        kind("half of the faces of a torus missing", Torus, count, |t| pierced(t, 0.5)),
+        kind("a third of the faces of a box missing", Box, count, |t| pierced(t, 1.0 / 3.0)),
+        kind("a third of the faces of three bars missing", Jack, count, |t| pierced(t, 1.0 / 3.0)),
+        kind("a fifth of the faces of both shells missing", Hollow, count, |t| pierced(t, 0.2)),
+        kind("one triangle of every square missing", Torus, count, |mut t| {
+            t.triangles = t.triangles.into_iter().step_by(2).collect();
+            t
+        }),
     ]
 }
 
@@ -64,6 +77,9 @@ fn windings() -> Vec<Kind> {
         kind("a third of the faces flipped", Torus, count, |t| turned(t, 0.33)),
         kind("two thirds of the faces flipped", Torus, count, |t| turned(t, 0.67)),
         kind("a third flipped, holes", Ball, count, |t| pierced(turned(t, 0.33), 0.02)),
+        kind("a third flipped, a fifth missing", Ball, count, |t| pierced(turned(t, 0.33), 0.2)),
+        kind("a third flipped, a third missing", Jack, count, |t| pierced(turned(t, 0.33), 1.0 / 3.0)),
+        kind("inside out, a third missing", Box, count, |t| pierced(reversed(t), 1.0 / 3.0)),
         kind("inside out", Ball, count, reversed),
         kind("inside out, holes", Torus, count, |t| pierced(reversed(t), 0.02)),
         kind("inside out without lid", Box, count, |t| without(reversed(t), |p| p.y > 0.62)),
@@ -276,6 +292,8 @@ fn sheets() -> Vec<Kind> {
         refused("two sheets", says, apart),
         refused("a sheet from both sides", says, both),
         refused("faces apart", says, apart_faces),
+        refused("two thirds of a ball missing", says, pierced(Ball.shape(), 2.0 / 3.0)),
+        refused("four fifths of a box missing", says, pierced(Box.shape(), 0.8)),
         refused("a single face", says, one),
         refused("a Möbius band", "one-sided", band(40, 1)),
         refused("only faces without area", "without area", flat),

@@ -9,6 +9,7 @@ mod rivals;
 mod search;
 
 use crate::args::{BackendArg, SplatArg};
+use crate::tell;
 use anyhow::{Result, bail};
 use cells::{Cell, cells, predicted, scene};
 use clap::{Args, ValueEnum};
@@ -19,6 +20,7 @@ use diaphane_runtime::frame::Frame;
 use diaphane_runtime::player::{LightMode, Player};
 use serde::Serialize;
 use std::collections::BTreeMap;
+use std::io::{self, Write};
 use std::path::PathBuf;
 use std::time::Instant;
 
@@ -111,6 +113,16 @@ struct Table {
     rivals: Option<rivals::Report>,
 }
 
+impl BenchArgs {
+    /// A line on standard output. An error if nobody reads it any more and no file is to be written either.
+    fn say(&self, line: &str) -> io::Result<()> {
+        match writeln!(io::stdout(), "{line}") {
+            Err(_) if self.output.is_some() || self.plots.is_some() => Ok(()),
+            said => said,
+        }
+    }
+}
+
 /// Runs all cells and prints them.
 pub fn run(args: &BenchArgs) -> Result<()> {
     if args.limit.is_nan() || args.limit <= 0.0 {
@@ -130,11 +142,11 @@ pub fn run(args: &BenchArgs) -> Result<()> {
         std::iter::once(&args.asset).chain(&args.also).map(|p| asset::read(p)).collect::<Result<_, _>>()?;
     let mut player = Player::with_path(&assets[0], args.backend.into(), args.splat.into())?;
     if let Some(note) = player.note() {
-        eprintln!("note: {note}");
+        tell(&format!("note: {note}"));
     }
     let (backend, adapter) = player.describe();
     let splat = player.path().map(diaphane_runtime::gpu::SplatPath::name);
-    println!("{backend}, {adapter}{}", splat.map_or(String::new(), |s| format!(", {s}")));
+    args.say(&format!("{backend}, {adapter}{}", splat.map_or(String::new(), |s| format!(", {s}"))))?;
     let mut table = Table {
         backend,
         adapter,
@@ -148,8 +160,8 @@ pub fn run(args: &BenchArgs) -> Result<()> {
     match args.part {
         Part::Axes => {}
         Part::All if backend != "gpu" => {
-            eprintln!(
-                "note: the rivals need a GPU, a software adapter at least (--backend gpu); they are left out"
+            tell(
+                "note: the rivals need a GPU, a software adapter at least (--backend gpu); they are left out",
             );
         }
         Part::Rivals if backend != "gpu" => {
@@ -158,7 +170,7 @@ pub fn run(args: &BenchArgs) -> Result<()> {
         Part::All | Part::Rivals => match rivals::run(&assets[0], &mut player, args) {
             Ok(report) => table.rivals = Some(report),
             Err(e) if args.part == Part::All && matches!(e.downcast_ref(), Some(Error::Rival(_))) => {
-                eprintln!("note: {e}; they are left out");
+                tell(&format!("note: {e}; they are left out"));
             }
             Err(e) => return Err(e),
         },
@@ -178,10 +190,10 @@ pub fn run(args: &BenchArgs) -> Result<()> {
 
 /// Measures the cells of all axes.
 fn axes(assets: &[Asset], mut player: Player, args: &BenchArgs, table: &mut Table) -> Result<()> {
-    println!(
+    args.say(&format!(
         "{:<22} {:>9} {:>6} {:>11} {:>9} {:>9} {:>11}",
         "axis", "samples", "lights", "pixels", "frame ms", "light ms", "splats/ray"
-    );
+    ))?;
     let mut played = ((0, 0), assets[0].clone());
     for cell in cells(assets[0].level_sizes().len(), assets.len()) {
         if played.0 != (cell.asset, cell.level) {
@@ -189,15 +201,15 @@ fn axes(assets: &[Asset], mut player: Player, args: &BenchArgs, table: &mut Tabl
             player = Player::with_path(&played.1, args.backend.into(), args.splat.into())?;
         }
         if predicted(&table.rows, &cell) * f64::from(args.frames + 1) > args.limit {
-            println!(
+            args.say(&format!(
                 "{:<22} skipped: {} lights at {} x {} would take longer than {} s",
                 cell.axis, cell.lights, cell.size[0], cell.size[1], args.limit
-            );
+            ))?;
             table.skipped.push(cell);
             continue;
         }
         let row = measure(&mut player, &played.1, cell, args.frames)?;
-        println!(
+        args.say(&format!(
             "{:<22} {:>9} {:>6} {:>11} {:>9.1} {:>9.1} {:>11.1}",
             cell.axis,
             row.samples,
@@ -206,7 +218,7 @@ fn axes(assets: &[Asset], mut player: Player, args: &BenchArgs, table: &mut Tabl
             row.frame_ms,
             row.lighting_ms(),
             row.splats_per_ray
-        );
+        ))?;
         table.rows.push(row);
     }
     Ok(())

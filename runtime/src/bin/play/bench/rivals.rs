@@ -94,14 +94,14 @@ pub fn run(asset: &Asset, player: &mut Player, args: &BenchArgs) -> Result<Repor
         skipped: Vec::new(),
         crossovers: Vec::new(),
     };
-    println!(
+    args.say(&format!(
         "equal error, {0} x {0} pixels, {1} views, times by the {2}'s clock",
         args.rival_size, args.frames, report.clock
-    );
-    println!(
+    ))?;
+    args.say(&format!(
         "{:<12} {:>6} {:>9} {:>6} {:>6} {:>11} {:>9}",
         "method", "lights", "error %", "steps", "nodes", "frame ms", "/ splats"
-    );
+    ))?;
     let mut efforts: [Option<(Effort, Option<f64>)>; 3] = [None; 3];
     for lights in LIGHTS {
         let errors = equalise(&mut contest, args, lights, &mut efforts, &mut report)?;
@@ -115,7 +115,7 @@ pub fn run(asset: &Asset, player: &mut Player, args: &BenchArgs) -> Result<Repor
         if verdict == Verdict::Unmeasured && report.skipped.iter().any(unreached) {
             verdict = Verdict::OutOfReach;
         }
-        println!("against the {}: {}", against.name(), verdict.text());
+        args.say(&format!("against the {}: {}", against.name(), verdict.text()))?;
         report.crossovers.push(Crossover { against, verdict });
     }
     Ok(report)
@@ -191,7 +191,7 @@ fn equalise(
         efforts[method as usize] = cheapest[method as usize].map(|(_, effort, error)| (effort, Some(error)));
         if efforts[method as usize].is_none() {
             let why = UNREACHED.to_owned();
-            skip(report, method, lights, why);
+            skip(args, report, method, lights, why)?;
         }
     }
     Ok(Some(Errors { splats, truth: own }))
@@ -228,7 +228,7 @@ fn time(
     let effort = known.map(|k| k.0);
     if method != Method::Splats && effort.is_none() {
         if errors.is_none() {
-            skip(report, method, lights, format!("its truth would take longer than {} s", args.limit));
+            skip(args, report, method, lights, format!("its truth would take longer than {} s", args.limit))?;
         }
         return Ok(());
     }
@@ -238,7 +238,7 @@ fn time(
     let before = 1e-3 * extrapolated(&measured, lights) * frames.len() as f64;
     let rays = effort.map_or(0.0, |e| contest.predicted(e, &frames));
     if before.max(rays) > args.limit {
-        skip(report, method, lights, format!("would take longer than {} s", args.limit));
+        skip(args, report, method, lights, format!("would take longer than {} s", args.limit))?;
         return Ok(());
     }
     let nothing = Effort { steps: 0, stride: 1.0, side: 0, lit: 0 };
@@ -249,21 +249,21 @@ fn time(
     };
     let row = Row { method, lights, ms, rel_rmse, truth_error: errors.as_ref().map(|e| e.truth), effort };
     report.rows.push(row);
-    print(&report.rows);
+    print(args, &report.rows)
+}
+
+fn skip(args: &BenchArgs, report: &mut Report, method: Method, lights: usize, why: String) -> Result<()> {
+    args.say(&format!("{:<12} {lights:>6} skipped: {why}", method.name()))?;
+    report.skipped.push(Skipped { method, lights, why });
     Ok(())
 }
 
-fn skip(report: &mut Report, method: Method, lights: usize, why: String) {
-    println!("{:<12} {lights:>6} skipped: {why}", method.name());
-    report.skipped.push(Skipped { method, lights, why });
-}
-
 /// The last row.
-fn print(rows: &[Row]) {
-    let Some(row) = rows.last() else { return };
+fn print(args: &BenchArgs, rows: &[Row]) -> Result<()> {
+    let Some(row) = rows.last() else { return Ok(()) };
     let some = |value: Option<u32>| value.filter(|v| *v > 0).map_or("-".to_owned(), |v| v.to_string());
     let splats = rows.iter().find(|r| r.method == Method::Splats && r.lights == row.lights);
-    println!(
+    args.say(&format!(
         "{:<12} {:>6} {:>9} {:>6} {:>6} {:>11.1} {:>9}",
         row.method.name(),
         row.lights,
@@ -272,7 +272,8 @@ fn print(rows: &[Row]) {
         some(row.effort.map(|e| e.side)),
         row.ms,
         splats.map_or("-".to_owned(), |s| format!("{:.2}", row.ms / s.ms)),
-    );
+    ))?;
+    Ok(())
 }
 
 /// (lights, the rival's time over the splats') where both were measured.
