@@ -10,9 +10,13 @@
 //!
 //! [`GpuRenderer`] owns its device and reads pictures back; [`PictureRenderer`] records the same passes into a command buffer,
 //! with two more for a window: publish (mean of the rays so far) and display (exposure). [`Renderer`] draws many objects into
-//! a host program's frame, with passes that clip at its depth buffer, compose objects front to back and overlay its picture. Boundary runs where `ior` is not 1, profile where the medium has a density grid. Later pieces of rays are
-//! drawn indirectly and cost next to nothing where no ray has them.
-//! Passes over samples run once for each shard (`shard.rs`). [`rivals`] draws the same light in other ways. Sums are kept in 32-bit floats and added in the
+//! a host program's frame, with passes that clip at its depth buffer, compose objects front to back and overlay its picture. Boundary
+//! runs where `ior` is not 1, profile where the medium has a density grid. Later pieces of rays are drawn indirectly and cost next to
+//! nothing where no ray has them.
+//!
+//! A pass runs for a [`lot`] of tiles at once: their views are an array, and the state of each lies behind that of the one before.
+//! Passes over samples run once for each [`shard`], the mesh is drawn in [`mesh`] parts, and the density grid is cut into [`slabs`].
+//! [`rivals`] draws the same light in other ways; [`GpuDepths`] traces exact depths. Sums are kept in 32-bit floats and added in the
 //! order of the samples: the same adapter draws the same bits every time.
 
 mod asset;
