@@ -201,7 +201,7 @@ impl Player {
         &self.info
     }
 
-    /// Draws a frame. Where an unchanged frame is reused the list of passes is empty.
+    /// Draws a frame. Where an unchanged frame is reused nothing is copied, and the list of passes is empty.
     ///
     /// # Errors
     /// The GPU failed.
@@ -212,8 +212,10 @@ impl Player {
             && last == frame
             && *last_mode == mode
         {
-            return Ok(Rendered { passes: Vec::new(), ..rendered.clone() });
+            return Ok(rendered.clone());
         }
+        // Its picture may be drawn on again.
+        self.last = None;
         let started = Instant::now();
         let (exact, report) = self.exact(frame, mode);
         let exact_ms = started.elapsed().as_secs_f64() * 1e3;
@@ -227,7 +229,7 @@ impl Player {
         }
         rendered.exact = report;
         if self.reuse {
-            self.last = Some((frame.clone(), mode, rendered.clone()));
+            self.last = Some((frame.clone(), mode, Rendered { passes: Vec::new(), ..rendered.clone() }));
         }
         Ok(rendered)
     }

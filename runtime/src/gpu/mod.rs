@@ -15,6 +15,7 @@
 //! Passes over samples run once for each shard (`shard.rs`). [`rivals`] draws the same light in other ways. Sums are kept in 32-bit floats and added in the
 //! order of the samples: the same adapter draws the same bits every time.
 
+mod arrived;
 mod asset;
 mod bindings;
 mod census;

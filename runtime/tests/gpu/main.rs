@@ -5,6 +5,7 @@ mod census;
 mod edits;
 mod endurance;
 mod faults;
+mod frames;
 mod host;
 mod objects;
 mod scenes;
