@@ -147,7 +147,8 @@ impl CpuRenderer {
         let mut picture = self.canvas.take(frame.width, frame.height, area);
         let mut counters = Counters { samples_drawn: self.samples_drawn, ..Counters::default() };
         let mut seconds = [0.0; 3];
-        let mut cells = vec![Cells::new(frame); if self.counting { offsets.len() } else { 0 }];
+        let counted = if self.counting { offsets.len() } else { 0 };
+        let mut cells: Vec<Cells> = (0..counted).map(|_| Cells::new(frame)).collect();
         for block in blocks {
             scatter(block.rect, picture.width, &block.pixels, |to, (radiance, _)| {
                 picture.pixels[to] = radiance.to_array();
