@@ -1,5 +1,6 @@
 //! Counts and timings as JSON.
 
+use crate::levels::Kept;
 use anyhow::Result;
 use diaphane_formats::files;
 use diaphane_runtime::exact::ExactReport;
@@ -24,6 +25,7 @@ pub struct Stats {
     width: u32,
     height: u32,
     samples_per_pixel: u32,
+    /// Of the level of detail that was drawn last.
     samples: u64,
     samples_drawn: u64,
     /// As played, at density 1, 1 / mesh unit.
@@ -39,6 +41,8 @@ pub struct Stats {
     /// Lights of the scene's list.
     scene_lights: usize,
     frames: u32,
+    /// Which levels of detail kept the frames in a budget of time, where one was given.
+    budget: Option<Kept>,
     /// Mean number of kernels over the rays that hit the object.
     splats_per_pixel: f64,
     frame_ms: Spread,
@@ -91,6 +95,7 @@ impl Stats {
             exact: ExactReport::default(),
             scene_lights: frame.scene_lights,
             frames,
+            budget: None,
             splats_per_pixel: 0.0,
             frame_ms: Spread::default(),
             pass_ms: BTreeMap::new(),
@@ -114,10 +119,14 @@ impl Stats {
     }
 
     /// Writes everything to `path`. The backend is the one that drew the last frame.
-    pub fn write(mut self, player: &Player, path: &Path) -> Result<()> {
-        (self.backend, self.adapter) = player.describe();
-        self.splat = player.path().map(SplatPath::name);
-        self.shards = player.shards();
+    pub fn write(mut self, player: Option<&Player>, budget: Option<Kept>, path: &Path) -> Result<()> {
+        if let Some(player) = player {
+            (self.backend, self.adapter) = player.describe();
+            self.splat = player.path().map(SplatPath::name);
+            self.shards = player.shards();
+            self.samples = player.info().samples;
+        }
+        self.budget = budget;
         self.frame_ms = Spread::of(&self.frame_times);
         self.pass_ms = self.pass_times.iter().map(|(name, times)| (*name, Spread::of(times))).collect();
         let mut json = serde_json::to_string_pretty(&self)?;
