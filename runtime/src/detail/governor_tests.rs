@@ -143,7 +143,7 @@ fn steps_are_bounded_and_nothing_is_finer_than_asked_for() {
         s.per_sample = if k / 100 % 2 == 0 { 1e-2 } else { 1e-6 };
         s.draw();
         let now = s.governor.fineness().kernel_pixels;
-        assert!(now >= Fineness::DEFAULT.kernel_pixels && now <= LAST_REACH * 1.001);
+        assert!((Fineness::DEFAULT.kernel_pixels..=1.001 * LAST_REACH).contains(&now));
         assert!((now / before).log2().abs() <= COARSER + 1e-5, "{before} {now}");
         (before, most) = (now, most.max(now));
     }

@@ -25,21 +25,23 @@ pub(super) fn paint(
     let per_ray = 1.0 / rays as f32;
     let coverage = picture.coverage.get_or_insert_with(|| vec![0.0; picture.pixels.len()]);
     let least = SHARED.div_ceil(columns);
-    let row =
-        |(((pixels, covered), sums), counts): (((&mut [[f32; 3]], &mut [f32]), &[[f32; 4]]), &[[u32; 4]])| {
-            let place = left..left + columns;
-            paint_row(&mut pixels[place.clone()], &mut covered[place], sums, counts, per_ray)
-        };
+    let row = |((pixels, covered), (sums, counts)): Row| {
+        let place = left..left + columns;
+        paint_row(&mut pixels[place.clone()], &mut covered[place], sums, counts, per_ray)
+    };
     if rows <= least {
         let to = picture.pixels.chunks_mut(width).zip(coverage.chunks_mut(width)).skip(top);
-        let all = to.zip(radiance.chunks(columns)).zip(counts.chunks(columns)).take(rows);
-        all.map(row).fold([0; 4], added)
+        let from = radiance.chunks(columns).zip(counts.chunks(columns));
+        to.zip(from).take(rows).map(row).fold([0; 4], added)
     } else {
         let to = picture.pixels.par_chunks_mut(width).zip(coverage.par_chunks_mut(width)).skip(top);
-        let all = to.zip(radiance.par_chunks(columns)).zip(counts.par_chunks(columns)).take(rows);
-        all.with_min_len(least).map(row).reduce(|| [0; 4], added)
+        let from = radiance.par_chunks(columns).zip(counts.par_chunks(columns));
+        to.zip(from).take(rows).with_min_len(least).map(row).reduce(|| [0; 4], added)
     }
 }
+
+/// Pixels and coverage of a picture's row, radiance and counts of a tile's.
+type Row<'a> = ((&'a mut [[f32; 3]], &'a mut [f32]), (&'a [[f32; 4]], &'a [[u32; 4]]));
 
 fn added(a: [u64; 4], b: [u64; 4]) -> [u64; 4] {
     std::array::from_fn(|k| a[k] + b[k])
