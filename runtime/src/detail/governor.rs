@@ -27,7 +27,7 @@ const OTHER: f64 = 0.1;
 const PAUSE: u32 = 16;
 const LONGEST_PAUSE: u32 = 2048;
 /// Pixels that kernels may reach as soon as a budget asks for it, and at the most.
-const FIRST_REACH: f32 = 0.1;
+const FIRST_REACH: f32 = 1.0;
 const LAST_REACH: f32 = 512.0;
 
 /// Keeps frames within a budget of milliseconds through the levels that they are drawn with.

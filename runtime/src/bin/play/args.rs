@@ -12,6 +12,8 @@ const EXAMPLES: &str = "\
 Examples:
   diaphane-play statue.dph
       opens the window
+  diaphane-play statue.dph --budget 16
+      the same; while something moves levels of detail keep a frame within 16 ms
   diaphane-play statue.dph --output statue.png
       draws the asset in a default scene: from 45 degrees above, three lights
   diaphane-play statue.dph --scene side.scene.toml --output side.exr
@@ -87,9 +89,10 @@ pub struct Args {
     /// bake measured of its error
     #[arg(long, value_name = "K|auto", requires = "output", value_parser = parse_level)]
     pub level: Option<LevelArg>,
-    /// Take coarser levels than `--level auto` does where a frame takes longer than this many milliseconds, by what the frames
-    /// before took (see --frames), and finer ones again when there is time
-    #[arg(long, value_name = "MS", requires = "level", value_parser = parse_budget, allow_negative_numbers = true)]
+    /// Take coarser levels of detail where a frame takes longer than this many milliseconds, by what the frames before took, and
+    /// finer ones again when there is time: with `--level auto` than that does, over --frames; in the window than all samples,
+    /// while something moves (and fewer pixels where levels do not suffice)
+    #[arg(long, value_name = "MS", value_parser = parse_budget, allow_negative_numbers = true)]
     pub budget: Option<f64>,
     /// Draw the frame this many times, for timings
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1_000_000),
