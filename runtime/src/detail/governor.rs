@@ -111,9 +111,9 @@ impl Governor {
     }
 
     /// Takes what a frame drawn with [`Self::fineness`] took, and how many samples of all levels were in it. Returns what the next
-    /// one is to be drawn with. Times that are none are left out.
+    /// one is to be drawn with. Times that are none are left out, and frames in which nothing was drawn.
     pub fn learn(&mut self, milliseconds: f64, samples: u64) -> Fineness {
-        if milliseconds.is_finite() && milliseconds > 0.0 {
+        if milliseconds.is_finite() && milliseconds > 0.0 && samples > 0 {
             self.take(milliseconds, samples);
             self.step();
         }

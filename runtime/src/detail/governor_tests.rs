@@ -160,6 +160,8 @@ fn one_slow_frame_and_times_that_are_none_change_nothing() {
             _ => 15.0,
         };
         assert_eq!(governor.learn(milliseconds, 50_000), Fineness::DEFAULT, "frame {k}");
+        // Nothing was drawn.
+        governor.learn(99.0, 0);
     }
 }
 
