@@ -128,6 +128,17 @@ impl Player {
         }
     }
 
+    /// Why kernels are summed in this way; `None` on the CPU.
+    pub fn why_path(&self) -> Option<&'static str> {
+        let device = self.device()?;
+        Some(if self.path.is_some() { "asked for" } else { SplatPath::why_best(device) })
+    }
+
+    /// Whether times of passes come from the adapter's own clock; `None` on the CPU.
+    pub fn has_clock(&self) -> Option<bool> {
+        self.device().map(|device| device.features().contains(wgpu::Features::TIMESTAMP_QUERY))
+    }
+
     /// Whether later frames may keep what an unchanged frame computed before. Off at first: every frame redoes every
     /// pass.
     pub fn set_reuse(&mut self, reuse: bool) {

@@ -197,7 +197,10 @@ fn writes_picture_and_statistics() {
     let census = &stats["counters"]["census"];
     assert_eq!((&census["views"], &census["tiles"]), (&2.into(), &2.into()), "{census}");
     assert_eq!(census["samples_shown"].as_u64(), stats["samples"].as_u64().map(|n| 2 * n), "{census}");
-    assert!(stats.get("shards").is_some_and(serde_json::Value::is_null));
+    for key in ["shards", "splat", "splat_why", "clock", "budget"] {
+        assert!(stats.get(key).is_some_and(serde_json::Value::is_null), "{key}");
+    }
+    assert_eq!(stats["notes"], serde_json::json!([]));
     for time in ["min", "median", "max"] {
         assert!(stats["frame_ms"][time].is_number() && stats["pass_ms"]["splat"][time].is_number());
     }

@@ -7,6 +7,7 @@ use diaphane_formats::asset::Asset;
 use diaphane_formats::scene::Camera;
 use diaphane_runtime::frame::Frame;
 use diaphane_runtime::gpu::{GpuDevice, GpuRenderer, SplatPath, instance};
+use diaphane_runtime::player::{Backend, LightMode, Player};
 use diaphane_runtime::rendered::Rendered;
 use glam::DVec3;
 
@@ -73,4 +74,23 @@ fn a_frame_makes_no_buffers_that_stay() {
         after.push(alive());
     }
     assert!(after[0] > 10 && after[1..].iter().all(|n| *n == after[1]), "{after:?}");
+}
+
+#[test]
+fn a_player_says_why_it_sums_kernels_in_its_way() {
+    let asset = Object { spacing: 0.3, ..ball() }.build();
+    if gpu(&asset).is_none() {
+        return;
+    }
+    let mut asked = Player::with_path(&asset, Backend::Gpu, Some(SplatPath::Tiles)).unwrap();
+    assert_eq!((asked.path(), asked.why_path()), (Some(SplatPath::Tiles), Some("asked for")));
+    let player = Player::new(&asset, Backend::Gpu).unwrap();
+    let software = player.describe().1.ends_with("software)");
+    assert_eq!(player.why_path().unwrap().contains("software"), software);
+    let frame = &frames(&asset)[0];
+    let timed = asked.has_clock().unwrap();
+    let rendered = asked.render(frame, LightMode::Baked).unwrap();
+    assert_eq!(rendered.passes.iter().any(|(name, _)| *name == "frame"), !timed);
+    let cpu = Player::new(&asset, Backend::Cpu).unwrap();
+    assert_eq!((cpu.path(), cpu.why_path(), cpu.has_clock()), (None, None, None));
 }

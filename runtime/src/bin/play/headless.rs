@@ -55,7 +55,7 @@ pub fn run(args: &Args, output: &Path) -> Result<()> {
     write(output, &rendered.picture, format)?;
     let kept = levels.tell_budget();
     if let Some(path) = &args.stats {
-        stats.write(levels.last(), kept, path)?;
+        stats.write(&levels, kept, path)?;
     }
     Ok(())
 }

@@ -18,6 +18,8 @@ pub struct Levels<'a> {
     players: Vec<Option<(Option<Asset>, Player)>>,
     level: usize,
     budget: Option<Budget>,
+    /// What was said of the backend, each once.
+    notes: Vec<String>,
 }
 
 /// How a budget is kept.
@@ -42,7 +44,7 @@ pub struct Kept {
 impl<'a> Levels<'a> {
     /// The levels that `args` ask for; says which one is chosen for all frames.
     pub fn new(args: &'a Args, asset: Asset, frame: &Frame) -> Result<Self> {
-        let mut levels = Self { args, asset, players: vec![None], level: 0, budget: None };
+        let mut levels = Self { args, asset, players: vec![None], level: 0, budget: None, notes: Vec::new() };
         match (args.level, args.budget) {
             (Some(LevelArg::Auto), Some(milliseconds)) => levels.keep_to(milliseconds, frame),
             (Some(LevelArg::Auto), None) => levels.take_fine_enough(frame)?,
@@ -85,7 +87,7 @@ impl<'a> Levels<'a> {
         let place = &mut self.players[self.level];
         if place.is_none() {
             let own = self.budget.is_some().then(|| self.asset.level(self.level)).transpose()?;
-            let player = open(self.args, own.as_ref().unwrap_or(&self.asset))?;
+            let player = open(self.args, own.as_ref().unwrap_or(&self.asset), &mut self.notes)?;
             *place = Some((own, player));
         }
         let (own, player) = place.as_mut().context("there is no such level of detail")?;
@@ -98,7 +100,8 @@ impl<'a> Levels<'a> {
         let started = Instant::now();
         let rendered = player.render_anyway(asset, frame, mode)?;
         let milliseconds = started.elapsed().as_secs_f64() * 1e3;
-        tell(player);
+        let note = player.take_note();
+        tell(note, &mut self.notes);
         if let Some(Budget { governor, kept, .. }) = &mut self.budget {
             governor.learn(milliseconds, rendered.counters.samples_drawn);
             kept.level = self.level;
@@ -110,6 +113,11 @@ impl<'a> Levels<'a> {
     /// The player of the last frame.
     pub fn last(&self) -> Option<&Player> {
         self.players[self.level].as_ref().map(|(_, player)| player)
+    }
+
+    /// What was said of the backend.
+    pub fn notes(&self) -> &[String] {
+        &self.notes
     }
 
     /// Says which levels a budget came to. Returns it.
@@ -135,9 +143,10 @@ fn chooser(asset: &Asset, frame: &Frame) -> impl Fn(Fineness) -> usize + 'static
     move |fineness| fineness.choose(&details, pixels, varies).level
 }
 
-fn open(args: &Args, asset: &Asset) -> Result<Player> {
+fn open(args: &Args, asset: &Asset, notes: &mut Vec<String>) -> Result<Player> {
     let mut player = Player::with_path(asset, args.backend.into(), args.splat.into())?;
-    tell(&mut player);
+    // The same for every level.
+    tell(player.take_note().filter(|note| !notes.contains(note)), notes);
     player.edit(&args.edit())?;
     player.set_reuse(args.reuse);
     player.set_counting(args.stats.is_some());
@@ -145,8 +154,10 @@ fn open(args: &Args, asset: &Asset) -> Result<Player> {
 }
 
 /// Says why something else draws than one might expect.
-fn tell(player: &mut Player) {
-    if let Some(note) = player.take_note() {
-        eprintln!("note: {note}");
+fn tell(note: Option<String>, notes: &mut Vec<String>) {
+    let Some(note) = note else { return };
+    eprintln!("note: {note}");
+    if !notes.contains(&note) {
+        notes.push(note);
     }
 }

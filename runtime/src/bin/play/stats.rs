@@ -1,6 +1,6 @@
 //! Counts and timings as JSON.
 
-use crate::levels::Kept;
+use crate::levels::{Kept, Levels};
 use anyhow::Result;
 use diaphane_formats::files;
 use diaphane_runtime::exact::ExactReport;
@@ -20,6 +20,12 @@ pub struct Stats {
     adapter: String,
     /// How a GPU summed the kernels.
     splat: Option<&'static str>,
+    /// Why in this way.
+    splat_why: Option<&'static str>,
+    /// Whether a GPU's `pass_ms` are by its own clock; else they are one entry, measured outside.
+    clock: Option<bool>,
+    /// Why another backend draws than would have been preferred, and what else was said on the way.
+    notes: Vec<String>,
     /// Parts that the samples were cut into, where a GPU's bindings are too small for all of them.
     shards: Option<usize>,
     width: u32,
@@ -82,6 +88,9 @@ impl Stats {
             backend,
             adapter,
             splat: player.path().map(SplatPath::name),
+            splat_why: player.why_path(),
+            clock: player.has_clock(),
+            notes: Vec::new(),
             shards: player.shards(),
             width: frame.width,
             height: frame.height,
@@ -118,11 +127,13 @@ impl Stats {
         self.splats_per_pixel = rendered.counters.splats_per_ray();
     }
 
-    /// Writes everything to `path`. The backend is the one that drew the last frame.
-    pub fn write(mut self, player: Option<&Player>, budget: Option<Kept>, path: &Path) -> Result<()> {
-        if let Some(player) = player {
+    /// Writes everything to `path`. The backend is the one that drew the last frame of `levels`.
+    pub fn write(mut self, levels: &Levels, budget: Option<Kept>, path: &Path) -> Result<()> {
+        self.notes = levels.notes().to_vec();
+        if let Some(player) = levels.last() {
             (self.backend, self.adapter) = player.describe();
             self.splat = player.path().map(SplatPath::name);
+            (self.splat_why, self.clock) = (player.why_path(), player.has_clock());
             self.shards = player.shards();
             self.samples = player.info().samples;
         }
