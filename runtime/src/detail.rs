@@ -1,4 +1,8 @@
-//! Which level of detail is fine enough for an object of some size in the picture.
+//! Which level of detail is fine enough for an object of some size in the picture, and for a budget of time.
+
+mod governor;
+
+pub use governor::Governor;
 
 use crate::frame::Frame;
 use diaphane_formats::asset::{Asset, Info};
@@ -37,21 +41,31 @@ impl Fineness {
     /// density does.
     pub fn choose(&self, levels: &[Detail], pixels: f32, varies: bool) -> Choice {
         // Reach of a level over what it may be.
-        let excess = |k: usize| {
-            let all = levels[0].error;
-            let good = all.zip(levels[k].error).map(|(all, own)| own <= self.error_ratio * all);
-            let factor = match (good, varies) {
-                (Some(true), _) => Self::MEASURED,
-                (Some(false), _) | (None, true) => 1.0 / 3.0,
-                (None, false) => 1.0,
-            };
-            levels[k].reach * pixels / (factor * self.kernel_pixels)
-        };
+        let excess =
+            |k: usize| levels[k].reach * pixels / (self.factor(levels, k, varies) * self.kernel_pixels);
         // Not a number where nothing is allowed and nothing is asked for.
         let level = (1..levels.len()).rev().find(|k| excess(*k) <= 1.0).unwrap_or(0);
         let next = if level + 1 < levels.len() { excess(level + 1) } else { f32::INFINITY };
         let coarser = ((Self::FADE - next) / (Self::FADE - 1.0)).clamp(0.0, 1.0);
         Choice { level, coarser: if coarser > 0.0 { coarser } else { 0.0 } }
+    }
+
+    /// How much further the kernels of a level may reach, by what is known of its error.
+    fn factor(&self, levels: &[Detail], level: usize, varies: bool) -> f32 {
+        let all = levels[0].error;
+        let good = all.zip(levels[level].error).map(|(all, own)| own <= self.error_ratio * all);
+        match (good, varies) {
+            (Some(true), _) => Self::MEASURED,
+            (Some(false), _) | (None, true) => 1.0 / 3.0,
+            (None, false) => 1.0,
+        }
+    }
+
+    /// From so many [`Self::kernel_pixels`] on the coarsest level is chosen: see [`Self::choose`], and [`Governor::set_coarsest`].
+    pub fn coarsest(&self, levels: &[Detail], pixels: f32, varies: bool) -> f32 {
+        let Some(last) = levels.len().checked_sub(1).filter(|last| *last > 0) else { return 0.0 };
+        // Not less for rounding.
+        1.001 * levels[last].reach * pixels / self.factor(levels, last, varies)
     }
 }
 
@@ -117,6 +131,21 @@ mod tests {
         // A level known to be worse only where it hardly shows.
         let level = |pixels| Fineness::DEFAULT.choose(&good, pixels, false).level;
         assert_eq!([level(60.0), level(20.0), level(1.0)], [1, 2, 3]);
+    }
+
+    #[test]
+    fn the_coarsest_level_is_chosen_from_where_it_is_said() {
+        for errors in [None, Some([0.02, 0.021, 0.05, 0.1]), Some([0.02, 0.021, 0.021, 0.021])] {
+            for (pixels, varies) in [(20.0, false), (400.0, true), (1234.5, false)] {
+                let levels = levels(errors);
+                let enough = Fineness::DEFAULT.coarsest(&levels, pixels, varies);
+                let level = |kernel_pixels| {
+                    Fineness { kernel_pixels, ..Fineness::DEFAULT }.choose(&levels, pixels, varies).level
+                };
+                assert_eq!((level(enough), level(0.99 * enough)), (3, 2), "{errors:?} {pixels}");
+            }
+        }
+        assert_eq!(Fineness::DEFAULT.coarsest(&levels(None)[..1], 100.0, false), 0.0);
     }
 
     #[test]

@@ -22,6 +22,7 @@ pub mod plot;
 pub mod rendered;
 pub mod usable;
 
+mod canvas;
 mod error;
 
 pub use error::{Error, Result};

@@ -131,6 +131,17 @@ impl Player {
         }
     }
 
+    /// Why kernels are summed in this way; `None` on the CPU.
+    pub fn why_path(&self) -> Option<&'static str> {
+        let device = self.device()?;
+        Some(if self.path.is_some() { "asked for" } else { SplatPath::why_best(device) })
+    }
+
+    /// Whether times of passes come from the adapter's own clock; `None` on the CPU.
+    pub fn has_clock(&self) -> Option<bool> {
+        self.device().map(|device| device.features().contains(wgpu::Features::TIMESTAMP_QUERY))
+    }
+
     /// Whether later frames may keep what an unchanged frame computed before. Off at first: every frame redoes every
     /// pass.
     pub fn set_reuse(&mut self, reuse: bool) {
@@ -215,7 +226,7 @@ impl Player {
         &self.info
     }
 
-    /// Draws a frame. Where an unchanged frame is reused the list of passes is empty.
+    /// Draws a frame. Where an unchanged frame is reused nothing is copied, and the list of passes is empty.
     ///
     /// # Errors
     /// The GPU failed.
@@ -226,8 +237,10 @@ impl Player {
             && last == frame
             && *last_mode == mode
         {
-            return Ok(Rendered { passes: Vec::new(), ..rendered.clone() });
+            return Ok(rendered.clone());
         }
+        // Its picture may be drawn on again.
+        self.last = None;
         let started = Instant::now();
         let (exact, report) = self.exact(frame, mode);
         let exact_ms = started.elapsed().as_secs_f64() * 1e3;
@@ -241,7 +254,7 @@ impl Player {
         }
         rendered.exact = report;
         if self.reuse {
-            self.last = Some((frame.clone(), mode, rendered.clone()));
+            self.last = Some((frame.clone(), mode, Rendered { passes: Vec::new(), ..rendered.clone() }));
         }
         Ok(rendered)
     }

@@ -4,6 +4,7 @@ use crate::exact::ExactReport;
 use crate::fold::LightCounts;
 use diaphane_formats::picture::Picture;
 use serde::Serialize;
+use std::sync::Arc;
 
 /// Most inside pieces of one ray that are drawn; further ones are counted.
 pub const MAX_PIECES: usize = 4;
@@ -11,8 +12,9 @@ pub const MAX_PIECES: usize = 4;
 /// A frame as drawn.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rendered {
-    /// Linear radiance; the coverage is the fraction of each pixel's rays that hit the mesh, 0..1.
-    pub picture: Picture,
+    /// Linear radiance; the coverage is the fraction of each pixel's rays that hit the mesh, 0..1. Shared with the renderer, which
+    /// draws on it again once nobody else holds it, and with frames that are the same.
+    pub picture: Arc<Picture>,
     /// What was counted on the way.
     pub counters: Counters,
     /// What became of the lights.

@@ -88,7 +88,7 @@ fn no_lights_no_light() {
     let asset = ball(0.2, HERE, Phase::Isotropic);
     let rendered = draw(&asset, &scene(HERE, 16, 1, Vec::new()), LightMode::Exact);
     assert!(rendered.picture.pixels.iter().flatten().all(|v| *v == 0.0));
-    let coverage = rendered.picture.coverage.unwrap();
+    let coverage = rendered.picture.coverage.as_ref().unwrap();
     assert!(coverage[8 * 16 + 8] == 1.0 && coverage[0] == 0.0);
 }
 

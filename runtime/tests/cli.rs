@@ -58,6 +58,55 @@ fn plays_one_level() {
     assert!(String::from_utf8_lossy(&none.stderr).contains("no level 2"), "{none:?}");
 }
 
+/// A budget that nothing keeps leads to the coarsest level, one that everything keeps to the finest, whatever the machine.
+#[test]
+fn a_budget_of_time_chooses_levels_and_says_which() {
+    let folder = folder("budget");
+    let mut ball = asset::read(&folder.join("ball.dph")).unwrap();
+    let all = ball.samples.len();
+    for (level, width_factor) in [(1, 2.2), (2, 3.0)] {
+        let weight = vec![1.0; all >> (2 * level)];
+        ball.levels.push(asset::Level { width_factor, weight, error: None });
+    }
+    asset::write(&folder.join("ball.dph"), &ball).unwrap();
+    // So large that all samples are drawn where there is time.
+    std::fs::write(
+        folder.join("near.toml"),
+        SCENE.replace("[0.4, 0.6, 4.6]", "[0, 0, 2.6]").replace("= 12", "= 99"),
+    )
+    .unwrap();
+    let arguments =
+        ["ball.dph", "--scene", "near.toml", "--backend", "cpu", "--output", "o.exr", "--stats", "s.json"];
+    let draw = |more: &[&str]| {
+        let done = play(&folder, &[&arguments[..], &["--level", "auto", "--frames", "80"], more].concat());
+        assert!(done.status.success(), "{done:?}");
+        let text = std::fs::read_to_string(folder.join("s.json")).unwrap();
+        let stats: serde_json::Value = serde_json::from_str(&text).unwrap();
+        (stats, String::from_utf8_lossy(&done.stderr).into_owned())
+    };
+    let (stats, said) = draw(&["--budget", "1e-6"]);
+    let frames: Vec<u64> =
+        stats["budget"]["frames"].as_array().unwrap().iter().map(|n| n.as_u64().unwrap()).collect();
+    assert!(
+        frames.len() == 3 && frames.iter().all(|n| *n > 0) && frames.iter().sum::<u64>() == 80,
+        "{frames:?}"
+    );
+    assert_eq!((&stats["budget"]["level"], &stats["samples"]), (&2.into(), &(all >> 4).into()));
+    assert_eq!(stats["samples_drawn"], all >> 4);
+    assert!(said.contains("for 0.000001 ms a frame: 0 in ") && said.contains("the last one 2"), "{said}");
+    let (stats, _) = draw(&["--budget", "1e9"]);
+    assert_eq!((&stats["budget"]["frames"][0], &stats["samples"]), (&80.into(), &all.into()));
+    let (stats, said) = draw(&[]);
+    assert!(stats["budget"].is_null() && said.contains("level of detail 0"), "{said}");
+    for refused in
+        [&["--budget", "5"][..], &["--budget", "5", "--level", "1"], &["--budget", "0", "--level", "auto"]]
+    {
+        let done = play(&folder, &[&arguments[..], refused].concat());
+        assert_eq!(done.status.code(), Some(2), "{refused:?}");
+        assert_eq!(String::from_utf8_lossy(&done.stderr).trim_end().lines().count(), 1, "{done:?}");
+    }
+}
+
 #[test]
 fn benchmarks_name_what_they_skip() {
     let folder = folder("bench");
@@ -148,7 +197,10 @@ fn writes_picture_and_statistics() {
     let census = &stats["counters"]["census"];
     assert_eq!((&census["views"], &census["tiles"]), (&2.into(), &2.into()), "{census}");
     assert_eq!(census["samples_shown"].as_u64(), stats["samples"].as_u64().map(|n| 2 * n), "{census}");
-    assert!(stats.get("shards").is_some_and(serde_json::Value::is_null));
+    for key in ["shards", "splat", "splat_why", "clock", "budget"] {
+        assert!(stats.get(key).is_some_and(serde_json::Value::is_null), "{key}");
+    }
+    assert_eq!(stats["notes"], serde_json::json!([]));
     for time in ["min", "median", "max"] {
         assert!(stats["frame_ms"][time].is_number() && stats["pass_ms"]["splat"][time].is_number());
     }

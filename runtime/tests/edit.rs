@@ -10,6 +10,7 @@ use diaphane_runtime::edit::Edit;
 use diaphane_runtime::frame::Frame;
 use diaphane_runtime::player::{Backend, LightMode, Player};
 use glam::DVec3;
+use std::sync::Arc;
 use support::{ball, point, scene};
 
 const HERE: DVec3 = DVec3::new(10.0, -3.0, 7.0);
@@ -28,7 +29,7 @@ fn frame(asset: &Asset) -> Frame {
     Frame::new(&scene(HERE, 24, 2, lights), &asset.info).unwrap()
 }
 
-fn draw(player: &mut Player, edit: &Edit, frame: &Frame, mode: LightMode) -> Picture {
+fn draw(player: &mut Player, edit: &Edit, frame: &Frame, mode: LightMode) -> Arc<Picture> {
     player.edit(edit).unwrap();
     player.render(frame, mode).unwrap().picture
 }

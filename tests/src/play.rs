@@ -7,6 +7,7 @@ use diaphane_runtime::Result;
 use diaphane_runtime::edit::Edit;
 use diaphane_runtime::frame::Frame;
 use diaphane_runtime::player::{Backend, LightMode, Player};
+use std::sync::Arc;
 use std::time::Instant;
 
 /// A picture as the player drew it.
@@ -82,7 +83,7 @@ pub fn play_edited(
     };
     times.sort_unstable_by(f64::total_cmp);
     Ok(Played {
-        picture: rendered.picture,
+        picture: Arc::unwrap_or_clone(rendered.picture),
         backend,
         adapter,
         frame_ms: times[(times.len() - 1) / 2],

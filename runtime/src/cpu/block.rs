@@ -63,11 +63,12 @@ impl Shared<'_> {
     /// Draws the pixels of `rect`.
     pub fn draw(&self, rect: Rect) -> Block {
         let pixels = rect.width() * (rect.high[1] - rect.low[1]) as usize;
+        let counted = if self.renderer.counting { self.offsets.len() } else { 0 };
         let mut block = Block {
             rect,
             pixels: vec![(Vec3::ZERO, 0.0); pixels],
             counters: Counters { rays: (pixels * self.offsets.len()) as u64, ..Counters::default() },
-            cells: vec![Cells::of(rect); if self.renderer.counting { self.offsets.len() } else { 0 }],
+            cells: (0..counted).map(|_| Cells::of(rect)).collect(),
             seconds: [0.0; 3],
         };
         let per_pixel = 1.0 / self.offsets.len() as f32;

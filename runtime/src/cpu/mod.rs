@@ -9,6 +9,7 @@ pub mod surface;
 pub mod tiles;
 
 use crate::Result;
+use crate::canvas::{Canvas, NOWHERE};
 use crate::exact::{ExactDepths, ExactReport};
 use crate::fold::{LightCounts, LightingKey, Plan};
 use crate::frame::Frame;
@@ -18,7 +19,6 @@ use crate::usable::{MOST_EXTINCTION, largest_extinction, usable_samples};
 use block::{Block, Shared};
 use diaphane_formats::asset::{Asset, DensityGrid, Info, Samples};
 use diaphane_formats::directions::subpixel_offsets;
-use diaphane_formats::picture::Picture;
 use diaphane_formats::reconstruct::Cloud;
 use diaphane_formats::slopes::{Source, Stencil, means_share};
 use diaphane_formats::visibility::Accel;
@@ -49,6 +49,7 @@ pub struct CpuRenderer {
     counting: bool,
     /// How far one sees into the medium.
     sight: f32,
+    canvas: Canvas,
     /// Sources of the last frame, and what they depend on.
     lit: Option<(LightingKey, Lit)>,
 }
@@ -86,6 +87,7 @@ impl CpuRenderer {
             reuse: false,
             counting: false,
             sight: sight(&asset.info, asset.density.as_ref()),
+            canvas: Canvas::default(),
             lit: None,
         })
     }
@@ -136,21 +138,24 @@ impl CpuRenderer {
         let kernels = tiles::kernels(&self.cloud, frame.view.origin);
         let shared =
             Shared { renderer: self, frame, sources: &lit.sources, kernels: &kernels, offsets: &offsets };
-        let seen = covered_squares(frame, &self.info).map(|[low, high]| Rect { low, high });
-        let rects = seen.map_or(Vec::new(), |rect| rect.split(BLOCK));
+        let seen = covered_squares(frame, &self.info);
+        let rects = seen.map_or(Vec::new(), |[low, high]| Rect { low, high }.split(BLOCK));
         let blocks: Vec<Block> =
             rects.into_par_iter().with_max_len(1).map(|rect| shared.draw(rect)).collect();
         let wall = milliseconds(started);
-        let mut picture = Picture::new(frame.width as usize, frame.height as usize);
-        let mut coverage = vec![0.0; picture.pixels.len()];
+        let area = seen.unwrap_or(NOWHERE);
+        let mut picture = self.canvas.take(frame.width, frame.height, area);
         let mut counters = Counters { samples_drawn: self.samples_drawn, ..Counters::default() };
         let mut seconds = [0.0; 3];
-        let mut cells = vec![Cells::new(frame); if self.counting { offsets.len() } else { 0 }];
+        let counted = if self.counting { offsets.len() } else { 0 };
+        let mut cells: Vec<Cells> = (0..counted).map(|_| Cells::new(frame)).collect();
         for block in blocks {
-            scatter(block.rect, picture.width, &block.pixels, |to, (radiance, covered)| {
+            scatter(block.rect, picture.width, &block.pixels, |to, (radiance, _)| {
                 picture.pixels[to] = radiance.to_array();
-                coverage[to] = covered;
             });
+            if let Some(coverage) = &mut picture.coverage {
+                scatter(block.rect, picture.width, &block.pixels, |to, (_, covered)| coverage[to] = covered);
+            }
             counters = counters.merge(block.counters);
             cells.iter_mut().zip(&block.cells).for_each(|(all, part)| all.put(block.rect, part));
             (0..3).for_each(|k| seconds[k] += block.seconds[k]);
@@ -159,10 +164,9 @@ impl CpuRenderer {
             let samples = shown::count(&self.cloud, frame, *offset, cells, self.sight);
             let (tiles, pieces) = cells.tiles();
             // Out of sight the GPU looks at one pixel.
-            let size = seen.map_or([1; 2], |rect| [0, 1].map(|c| rect.high[c] - rect.low[c]));
+            let size = seen.map_or([1; 2], |[low, high]| [0, 1].map(|c| high[c] - low[c]));
             counters.census.add(1, size, samples, tiles, pieces);
         }
-        picture.coverage = Some(coverage);
         let rays = (picture.pixels.len() * offsets.len()) as u64;
         counters = Counters { rays, rays_skipped: rays - counters.rays, ..counters };
         // The ray passes run interleaved on all threads: each gets its share of the time that passed on the clock.
@@ -173,6 +177,7 @@ impl CpuRenderer {
             passes.insert(0, ("lighting", lighting_ms));
         }
         let lights = lit.lights;
+        let picture = self.canvas.share(picture, area);
         self.lit = Some((key, lit));
         Rendered { picture, counters, lights, exact: ExactReport::default(), passes }
     }

@@ -1,14 +1,16 @@
 //! A renderer that owns its device and reads its pictures back.
 
+use super::arrived;
 use super::census;
 use super::device::{GpuDevice, instance};
 use super::faults::wait;
 use super::pipeline::Pipeline;
-use super::readback;
+use super::readback::Staging;
 use super::splatting::SplatPath;
 use super::targets::{CENSUS, Targets};
 use super::tiles::Tile;
 use super::timers::{PASSES, Pass, Timers};
+use crate::canvas::{Area, Canvas};
 use crate::exact::{ExactDepths, ExactReport};
 use crate::frame::Frame;
 use crate::placement::covered_squares;
@@ -16,9 +18,8 @@ use crate::rendered::{Counters, MAX_PIECES, RayResult, Rendered};
 use crate::{Error, Result};
 use diaphane_formats::asset::{Asset, Info};
 use diaphane_formats::directions::subpixel_offsets;
-use diaphane_formats::picture::Picture;
 use std::time::Instant;
-use wgpu::{Buffer, CommandEncoder, Device};
+use wgpu::{Buffer, CommandEncoder, Device, Queue};
 
 /// Draws frames of one asset on the GPU, or on a software adapter where that is all there is.
 pub struct GpuRenderer {
@@ -28,6 +29,8 @@ pub struct GpuRenderer {
     name: String,
     tiles: usize,
     slices: u32,
+    staging: Staging,
+    canvas: Canvas,
 }
 
 impl GpuRenderer {
@@ -50,7 +53,8 @@ impl GpuRenderer {
         owned.check()?;
         let timers = Timers::new(&owned.device, &owned.queue, 1);
         let name = owned.describe();
-        Ok(Self { owned, renderer, timers, name, tiles: 0, slices: 1 })
+        let (staging, canvas) = (Staging::default(), Canvas::default());
+        Ok(Self { owned, renderer, timers, name, tiles: 0, slices: 1, staging, canvas })
     }
 
     /// The adapter's name, backend, and whether it is software.
@@ -150,36 +154,37 @@ impl GpuRenderer {
     fn render_once(&mut self, frame: &Frame, exact: Option<&ExactDepths>) -> Result<Rendered> {
         let started = Instant::now();
         let offsets = subpixel_offsets(frame.samples_per_pixel as usize);
-        let mut picture = Picture::new(frame.width as usize, frame.height as usize);
-        let mut coverage = vec![0.0; picture.pixels.len()];
+        let area = self.area(frame);
+        let mut picture = self.canvas.take(frame.width, frame.height, area);
         let mut counters = Counters {
             rays: u64::from(frame.width) * u64::from(frame.height) * offsets.len() as u64,
             samples_drawn: self.renderer.asset.samples_drawn,
             ..Counters::default()
         };
-        let per_ray = 1.0 / offsets.len() as f32;
         let mut traced = 0;
-        let milliseconds = self.draw(frame, exact, &offsets, |tile, data| {
+        let milliseconds = self.draw(frame, exact, &offsets, Wanted::Picture, |tile, data| {
             traced += tile.pixels() * offsets.len() as u64;
-            for (i, (sum, counts)) in data.radiance.iter().zip(data.counters).enumerate() {
-                let at = data.place(tile, i, frame.width);
-                picture.pixels[at] = [sum[0] * per_ray, sum[1] * per_ray, sum[2] * per_ray];
-                coverage[at] = counts[0] as f32 * per_ray;
-                counters.rays_hit += u64::from(counts[0]);
-                counters.pieces_dropped += u64::from(counts[1]);
-                counters.splats += u64::from(counts[2]);
-                counters.uncovered += u64::from(counts[3]);
-            }
+            let [hit, dropped, splats, uncovered] =
+                arrived::paint(&mut picture, tile, data.radiance, data.counters, offsets.len());
+            counters.rays_hit += hit;
+            counters.pieces_dropped += dropped;
+            counters.splats += splats;
+            counters.uncovered += uncovered;
             census::add(&mut counters.census, data.census, offsets.len() as u64, tile.size);
         })?;
-        picture.coverage = Some(coverage);
         counters.rays_skipped = counters.rays - traced;
+        let picture = self.canvas.share(picture, area);
         let mut passes = Pass::named(&milliseconds);
         if passes.is_empty() {
             passes.push(("frame", started.elapsed().as_secs_f64() * 1e3));
         }
         let lights = self.renderer.light_counts();
         Ok(Rendered { picture, counters, lights, exact: ExactReport::default(), passes })
+    }
+
+    /// The pixels that are drawn. Out of sight it is one none the less, so that the sources are there.
+    fn area(&self, frame: &Frame) -> Area {
+        covered_squares(frame, &self.renderer.asset.info).unwrap_or([[0; 2], [1; 2]])
     }
 
     /// What one ray of every pixel sees, at `offset` inside the pixel (0..1), without highlights: rows one after the
@@ -205,7 +210,7 @@ impl GpuRenderer {
         let mut plain = frame.clone();
         plain.surface.reflection = false;
         let mut rays = vec![RayResult::default(); frame.width as usize * frame.height as usize];
-        self.draw(&plain, exact, &[offset], |tile, data| {
+        self.draw(&plain, exact, &[offset], Wanted::Rays, |tile, data| {
             for (i, sum) in data.radiance.iter().enumerate() {
                 let ray = &mut rays[data.place(tile, i, frame.width)];
                 ray.radiance = [sum[0], sum[1], sum[2]];
@@ -230,14 +235,16 @@ impl GpuRenderer {
         frame: &Frame,
         exact: Option<&ExactDepths>,
         offsets: &[[f32; 2]],
+        wanted: Wanted,
         take: impl FnMut(Tile, TileData),
     ) -> Result<[f64; PASSES]> {
-        let drawn = self.draw_tiles(frame, exact, offsets, take);
+        let drawn = self.draw_tiles(frame, exact, offsets, wanted, take);
         let fine = self.owned.check();
         if fine.is_ok() && drawn.is_ok() {
             return drawn;
         }
         self.renderer.forget_targets();
+        self.staging = Staging::default();
         // What is on its way comes in, and what was dropped is freed.
         let waited = wait(&self.owned.device);
         // What the device says comes before what follows from it; its loss comes before everything.
@@ -252,82 +259,112 @@ impl GpuRenderer {
         frame: &Frame,
         exact: Option<&ExactDepths>,
         offsets: &[[f32; 2]],
+        wanted: Wanted,
         mut take: impl FnMut(Tile, TileData),
     ) -> Result<[f64; PASSES]> {
+        let area = self.area(frame);
         let GpuDevice { device, queue, .. } = &self.owned;
-        // Out of sight one pixel is drawn none the less, so that the sources are there.
-        let area = covered_squares(frame, &self.renderer.asset.info).unwrap_or([[0; 2], [1; 2]]);
         let tiles = self.renderer.begin(device, queue, frame, exact, area)?;
         self.tiles = tiles.len();
         self.slices = self.renderer.largest(&tiles).slices;
-        let submissions = offsets.len() as u64 + 1;
+        let submissions = if offsets.len() > 1 { offsets.len() as u64 + 1 } else { 1 };
         if self.timers.capacity() < submissions {
             self.timers = Timers::new(device, queue, submissions);
         }
         let mut milliseconds = [0.0; PASSES];
         for (t, &tile) in tiles.iter().enumerate() {
-            self.renderer.write_views(device, queue, frame, &[tile], offsets, 0);
-            self.timers.restart();
-            // One submission for each ray keeps every one short, whatever the adapter's patience.
-            let submit = |timers: &mut Timers, record: &dyn Fn(&mut CommandEncoder, &mut Timers)| {
-                let mut encoder = device.create_command_encoder(&Default::default());
-                record(&mut encoder, timers);
-                timers.close(&mut encoder);
-                queue.submit([encoder.finish()]);
-            };
-            submit(&mut self.timers, &|encoder, timers| {
-                self.renderer.record_start(encoder, tile);
-                if t == 0 {
-                    self.renderer.record_lighting(encoder, timers);
-                }
-            });
-            for view in 0..offsets.len() {
-                submit(&mut self.timers, &|e, timers| self.renderer.record_ray(e, timers, view, tile, None));
-            }
-            self.read(tile, &mut milliseconds, &mut take)?;
+            self.submit(frame, tile, t == 0, offsets, wanted)?;
+            self.read(tile, wanted, &mut milliseconds, &mut take)?;
         }
         Ok(milliseconds)
     }
 
-    /// Waits for a tile and reads it back.
-    fn read(
-        &self,
+    /// Records and submits all that there is to do for a tile; what is wanted of it is on its way then.
+    fn submit(
+        &mut self,
+        frame: &Frame,
         tile: Tile,
+        first: bool,
+        offsets: &[[f32; 2]],
+        wanted: Wanted,
+    ) -> Result<()> {
+        let (device, queue, timers) = (&self.owned.device, &self.owned.queue, &mut self.timers);
+        self.renderer.write_views(device, queue, frame, &[tile], offsets, 0);
+        timers.restart();
+        let mut encoder = device.create_command_encoder(&Default::default());
+        self.renderer.record_start(&mut encoder, tile);
+        if first {
+            self.renderer.record_lighting(&mut encoder, timers);
+        }
+        for view in 0..offsets.len() {
+            // Where there are several rays a submission for each keeps every one short, whatever the adapter's patience.
+            if offsets.len() > 1 {
+                let done =
+                    std::mem::replace(&mut encoder, device.create_command_encoder(&Default::default()));
+                close(done, timers, queue);
+            }
+            self.renderer.record_ray(&mut encoder, timers, view, tile, None);
+        }
+        timers.close(&mut encoder);
+        let targets = self.renderer.targets().ok_or_else(nothing)?;
+        let size = 16 * tile.pixels();
+        let mut sources: Vec<(&Buffer, u64)> =
+            vec![(&targets.radiance, size), (&targets.counters, size), (&targets.census, CENSUS)];
+        sources.extend((wanted == Wanted::Rays).then(|| (&targets.pieces, targets.pieces.size())));
+        sources.extend(timers.buffer());
+        self.staging.record(device, &mut encoder, &sources);
+        queue.submit([encoder.finish()]);
+        Ok(())
+    }
+
+    /// Waits for a tile and hands it on.
+    fn read(
+        &mut self,
+        tile: Tile,
+        wanted: Wanted,
         milliseconds: &mut [f64; PASSES],
         take: &mut impl FnMut(Tile, TileData),
     ) -> Result<()> {
-        let targets = self.renderer.targets().ok_or_else(|| Error::Gpu("nothing was drawn".to_owned()))?;
-        let size = 16 * tile.pixels();
-        let mut sources: Vec<(&Buffer, u64)> = vec![
-            (&targets.radiance, size),
-            (&targets.counters, size),
-            (&targets.pieces, targets.pieces.size()),
-            (&targets.census, CENSUS),
-        ];
-        sources.extend(self.timers.buffer());
-        let copies = readback::buffers(&self.owned.device, &self.owned.queue, &sources)?;
-        self.owned.check()?;
-        let view = |i: usize| {
-            copies[i]
-                .get_mapped_range(..)
-                .map_err(|e| Error::Gpu(format!("cannot read the picture back: {e}")))
-        };
-        let (radiance, counters, pieces, census) = (view(0)?, view(1)?, view(2)?, view(3)?);
-        if let Some(reading) = self.timers.reading() {
-            reading.sum(&view(4)?, milliseconds);
-        }
-        take(
-            tile,
-            TileData {
-                radiance: bytemuck::cast_slice(&radiance),
-                counters: bytemuck::cast_slice(&counters),
-                pieces: bytemuck::cast_slice(&pieces),
-                census: bytemuck::cast_slice(&census),
-                stride: Targets::stride(targets),
-            },
-        );
-        Ok(())
+        let stride = self.renderer.targets().map(Targets::stride).ok_or_else(nothing)?;
+        let reading = self.timers.reading();
+        let owned = &self.owned;
+        self.staging.read(&owned.device, |views| {
+            let [radiance, counters, census, more @ ..] = views else { return };
+            let (pieces, times) = match (wanted, more) {
+                (Wanted::Rays, [pieces, times @ ..]) => (bytemuck::cast_slice(pieces), times),
+                _ => (&[][..], more),
+            };
+            if let (Some(reading), Some(times)) = (reading, times.first()) {
+                reading.sum(times, milliseconds);
+            }
+            let data = TileData {
+                radiance: bytemuck::cast_slice(radiance),
+                counters: bytemuck::cast_slice(counters),
+                census: bytemuck::cast_slice(census),
+                pieces,
+                stride,
+            };
+            take(tile, data);
+        })
     }
+}
+
+/// Ends a submission.
+fn close(mut encoder: CommandEncoder, timers: &mut Timers, queue: &Queue) {
+    timers.close(&mut encoder);
+    queue.submit([encoder.finish()]);
+}
+
+fn nothing() -> Error {
+    Error::Gpu("nothing was drawn".to_owned())
+}
+
+/// What is to come back of a tile beside radiance and counts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Wanted {
+    Picture,
+    /// The pieces of every ray, four times as many bytes as the radiance.
+    Rays,
 }
 
 /// What was read back of a tile: an entry for each pixel, rows one after the other.
@@ -336,7 +373,7 @@ struct TileData<'a> {
     radiance: &'a [[f32; 4]],
     /// Rays that hit, pieces dropped, kernels, rays without a kernel.
     counters: &'a [[u32; 4]],
-    /// Of the last ray: piece k of pixel i at `k * stride + i`: start, end, transmittances.
+    /// Of the last ray, where they were wanted: piece k of pixel i at `k * stride + i`: start, end, transmittances.
     pieces: &'a [[f32; 4]],
     /// Of all rays.
     census: &'a [u32],

@@ -19,6 +19,7 @@
 //! [`rivals`] draws the same light in other ways; [`GpuDepths`] traces exact depths. Sums are kept in 32-bit floats and added in the
 //! order of the samples: the same adapter draws the same bits every time.
 
+mod arrived;
 mod asset;
 mod bindings;
 mod census;

@@ -5,8 +5,8 @@ use super::faults::wait;
 use crate::{Error, Result};
 use std::sync::mpsc;
 use wgpu::{
-    Buffer, BufferUsages, CommandEncoder, Device, MapMode, Queue, TexelCopyBufferInfo, TexelCopyBufferLayout,
-    Texture,
+    Buffer, BufferUsages, BufferView, CommandEncoder, Device, MapMode, Queue, TexelCopyBufferInfo,
+    TexelCopyBufferLayout, Texture,
 };
 
 const MAPPABLE: BufferUsages = BufferUsages::MAP_READ.union(BufferUsages::COPY_DST);
@@ -29,6 +29,53 @@ pub(super) fn copy(device: &Device, encoder: &mut CommandEncoder, source: &Buffe
     let copy = empty_buffer(device, "copy", size, MAPPABLE);
     encoder.copy_buffer_to_buffer(source, 0, &copy, 0, size);
     copy
+}
+
+/// Buffers that bytes of the device come back in, kept from frame to frame.
+#[derive(Default)]
+pub(super) struct Staging {
+    kept: Vec<Buffer>,
+    /// Bytes that are used of the first ones.
+    used: Vec<u64>,
+}
+
+impl Staging {
+    /// Records copies of the first bytes of some buffers. They may be read when they were submitted.
+    pub fn record(&mut self, device: &Device, encoder: &mut CommandEncoder, sources: &[(&Buffer, u64)]) {
+        self.used = sources.iter().map(|(_, size)| *size).collect();
+        for (k, (source, size)) in sources.iter().enumerate() {
+            let kept = self.kept.get(k).filter(|kept| kept.size() >= *size);
+            let to = kept.cloned().unwrap_or_else(|| empty_buffer(device, "staging", *size, MAPPABLE));
+            encoder.copy_buffer_to_buffer(source, 0, &to, 0, *size);
+            if k < self.kept.len() {
+                self.kept[k] = to;
+            } else {
+                self.kept.push(to);
+            }
+        }
+    }
+
+    /// Waits for the device, and hands on what was copied, in the same order.
+    ///
+    /// # Errors
+    /// The device failed; nothing is kept then.
+    pub fn read(&mut self, device: &Device, take: impl FnOnce(&[BufferView])) -> Result<()> {
+        let read = self.read_kept(device, take);
+        if read.is_err() {
+            *self = Self::default();
+        }
+        read
+    }
+
+    fn read_kept(&self, device: &Device, take: impl FnOnce(&[BufferView])) -> Result<()> {
+        let copies = &self.kept[..self.used.len()];
+        map(device, copies)?;
+        let view = |(copy, size): (&Buffer, &u64)| copy.get_mapped_range(..*size);
+        let views: std::result::Result<Vec<_>, _> = copies.iter().zip(&self.used).map(view).collect();
+        take(&views.map_err(|e| Error::Gpu(format!("cannot read the picture back: {e}")))?);
+        copies.iter().for_each(Buffer::unmap);
+        Ok(())
+    }
 }
 
 /// All texels of a texture, rows one after the other without gaps.

@@ -15,7 +15,7 @@ use wgpu::{BindGroup, BindGroupLayout, Device, DeviceType, Features};
 pub enum SplatPath {
     /// A quad for each kernel, blended into textures of f32: needs `FLOAT32_BLENDABLE`.
     Quads,
-    /// Every tile of 8 × 8 pixels gathers its kernels in registers.
+    /// Every tile of 16 × 16 pixels gathers its kernels in registers.
     Tiles,
 }
 
@@ -34,6 +34,19 @@ impl SplatPath {
     pub(super) fn workgroups(self, device: &Device) -> u32 {
         let software = device.adapter_info().device_type == DeviceType::Cpu;
         if self == Self::Quads || software { 0 } else { 1024 }
+    }
+
+    /// Why [`Self::best`] is what it is, and whether tiles have the feature that makes them faster.
+    pub fn why_best(device: &Device) -> &'static str {
+        let software = device.adapter_info().device_type == DeviceType::Cpu;
+        match (software, Self::best(device), device.features().contains(Features::SUBGROUP)) {
+            (_, Self::Quads, _) => "a software adapter, which may keep memory of every tile",
+            (true, Self::Tiles, _) => "a software adapter that cannot blend 32-bit floats",
+            (false, Self::Tiles, true) => "the default of hardware, with subgroups",
+            (false, Self::Tiles, false) => {
+                "the default of hardware; it has no subgroups, which would be faster"
+            }
+        }
     }
 
     /// Itself where the device can take it.

@@ -342,3 +342,29 @@ fn a_level_fades_into_the_next() {
         assert!(apart(&both, &expected) < 2e-3, "{share}: {}", apart(&both, &expected));
     }
 }
+
+#[test]
+fn fineness_may_change_from_frame_to_frame() {
+    let Some(GpuDevice { device, queue, .. }) = device() else { return };
+    let (mut asset, scene) = (ball().build(), scene(outside()));
+    let weight = vec![1.0; asset.samples.len() / 4];
+    asset.levels.push(Level { width_factor: 1.6 * asset.info.width_factor, weight, error: None });
+    let coarsest = Fineness { kernel_pixels: 1e3, ..Fineness::DEFAULT };
+    let finest = Fineness { kernel_pixels: 0.0, ..Fineness::DEFAULT };
+    let with = |fineness| {
+        let options = Options { fineness, ..Options::new(FORMAT) };
+        let mut host = Host::with(device.clone(), queue.clone(), options);
+        host.put(&asset, Placement::IDENTITY);
+        host
+    };
+    let frame = host_frame(&scene, None);
+    let mut host = with(finest);
+    for fineness in [finest, coarsest, coarsest, finest, coarsest] {
+        host.renderer.set_fineness(fineness);
+        assert_eq!(host.draw(&frame), with(fineness).draw(&frame), "{fineness:?}");
+    }
+    // Nothing is drawn anew where nothing is said.
+    host.renderer.set_fineness(coarsest);
+    host.draw(&frame);
+    assert!(host.renderer.report().reused);
+}

@@ -6,6 +6,7 @@ mod edits;
 mod endurance;
 mod exact;
 mod faults;
+mod frames;
 mod host;
 mod objects;
 mod scenes;

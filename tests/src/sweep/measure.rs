@@ -17,6 +17,7 @@ use diaphane_formats::scene::Scene;
 use diaphane_runtime::Result;
 use diaphane_runtime::frame::Frame;
 use diaphane_runtime::player::{LightMode, Player};
+use std::sync::Arc;
 use std::time::Instant;
 
 /// Sections that do not grow with the samples.
@@ -145,7 +146,8 @@ pub fn splats(player: &mut Player, scene: &Scene, frames: usize) -> Result<Shot>
     }
     let (rendered, frame_ms) = timed(frames, || player.render(&frame, LightMode::Baked))?;
     let splats_per_ray = rendered.counters.splats_per_ray();
-    Ok(Shot { picture: rendered.picture, frame_ms, splats_per_ray, note: String::new() })
+    let picture = Arc::unwrap_or_clone(rendered.picture);
+    Ok(Shot { picture, frame_ms, splats_per_ray, note: String::new() })
 }
 
 /// Marches.

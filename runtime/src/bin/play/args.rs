@@ -12,12 +12,16 @@ const EXAMPLES: &str = "\
 Examples:
   diaphane-play statue.dph
       opens the window
+  diaphane-play statue.dph --budget 16
+      the same; while something moves levels of detail keep a frame within 16 ms
   diaphane-play statue.dph --output statue.png
       draws the asset in a default scene: from 45 degrees above, three lights
   diaphane-play statue.dph --scene side.scene.toml --output side.exr
       linear radiance with coverage in alpha
   diaphane-play statue.dph --scene side.scene.toml --output side.exr --frames 20 --stats side.json
       draws the frame 20 times, every pass anew, and writes timings
+  diaphane-play statue.dph --output statue.png --frames 200 --level auto --budget 16 --stats statue.json
+      draws it 200 times, at levels of detail that keep a frame within 16 ms, and says which
   diaphane-play lamp.dph --scene inside.scene.toml --output inside.exr --light auto
       traces rays to lights that stand inside the object
   diaphane-play statue.dph --extinction-scale 0.5 --albedo 0.9,0.8,0.6 --output amber.png
@@ -85,6 +89,11 @@ pub struct Args {
     /// bake measured of its error
     #[arg(long, value_name = "K|auto", requires = "output", value_parser = parse_level)]
     pub level: Option<LevelArg>,
+    /// Take coarser levels of detail where a frame takes longer than this many milliseconds, by what the frames before took, and
+    /// finer ones again when there is time: with `--level auto` than that does, over --frames; in the window than all samples,
+    /// while something moves (and fewer pixels where levels do not suffice)
+    #[arg(long, value_name = "MS", value_parser = parse_budget, allow_negative_numbers = true)]
+    pub budget: Option<f64>,
     /// Draw the frame this many times, for timings
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1_000_000),
           requires = "output")]
@@ -119,6 +128,11 @@ fn parse_level(text: &str) -> Result<LevelArg, String> {
         return Ok(LevelArg::Auto);
     }
     text.parse().map(LevelArg::One).map_err(|_| "a level is a number from 0 on, or auto".to_owned())
+}
+
+fn parse_budget(text: &str) -> Result<f64, String> {
+    let milliseconds = text.parse().ok().filter(|ms: &f64| ms.is_finite() && *ms > 0.0);
+    milliseconds.ok_or_else(|| "a budget is a number of milliseconds above 0".to_owned())
 }
 
 /// [`Backend`] on the command line.

@@ -1,18 +1,16 @@
 //! One picture and its timings, without a window.
 
 use crate::args::{Args, LevelArg};
+use crate::levels::Levels;
 use crate::stats::Stats;
 use anyhow::{Result, bail};
-use diaphane_formats::asset::Asset;
 use diaphane_formats::files::{require_different, require_writable};
 use diaphane_formats::picture::{Display, Picture, write_exr, write_png};
 use diaphane_formats::{asset, scene};
-use diaphane_runtime::detail::{Fineness, details, pixels_at_nearest};
 use diaphane_runtime::frame::Frame;
 use diaphane_runtime::framing::default_scene;
-use diaphane_runtime::player::{LightMode, Player};
+use diaphane_runtime::player::LightMode;
 use std::path::Path;
-use std::time::Instant;
 
 /// How the picture is stored.
 #[derive(Clone, Copy)]
@@ -26,6 +24,9 @@ pub fn run(args: &Args, output: &Path) -> Result<()> {
     let format = format_of(output)?;
     check_paths(args, output)?;
     args.edit().validate()?;
+    if args.budget.is_some() && args.level != Some(LevelArg::Auto) {
+        bail!("--budget chooses levels of detail itself: it needs --level auto");
+    }
     let asset = match args.level {
         Some(LevelArg::One(level)) => asset::read_level(&args.asset, level)?,
         Some(LevelArg::Auto) | None => asset::read(&args.asset)?,
@@ -35,51 +36,28 @@ pub fn run(args: &Args, output: &Path) -> Result<()> {
         None => default_scene(&asset.info),
     };
     let frame = Frame::new(&scene, &asset.info)?;
-    let asset = if args.level == Some(LevelArg::Auto) { fine_enough(&asset, &frame)? } else { asset };
     let marked = !frame.lights_marked().is_empty();
     let default = if marked { LightMode::Auto } else { LightMode::Baked };
     let mode: LightMode = args.light.map_or(default, Into::into);
     warn(&frame, &asset.info, mode);
-    let mut player = Player::with_path(&asset, args.backend.into(), args.splat.into())?;
-    tell(&mut player);
-    let edit = args.edit();
-    player.edit(&edit)?;
-    if let Some(warning) = edit.warning() {
+    let mut levels = Levels::new(args, asset, &frame)?;
+    let mut stats = Stats::new(levels.player()?, &frame, args.frames);
+    if let Some(warning) = args.edit().warning() {
         eprintln!("warning: {warning}");
     }
-    player.set_reuse(args.reuse);
-    player.set_counting(args.stats.is_some());
-    let mut stats = Stats::new(&player, &frame, args.frames);
     let mut rendered = None;
     for _ in 0..args.frames {
-        let started = Instant::now();
-        let frame = player.render_anyway(&asset, &frame, mode)?;
-        tell(&mut player);
-        stats.add(started.elapsed().as_secs_f64() * 1e3, &frame);
-        rendered = Some(frame);
+        let (drawn, milliseconds) = levels.draw(&frame, mode)?;
+        stats.add(milliseconds, &drawn);
+        rendered = Some(drawn);
     }
     let Some(rendered) = rendered else { bail!("--frames must be at least 1") };
     write(output, &rendered.picture, format)?;
+    let kept = levels.tell_budget();
     if let Some(path) = &args.stats {
-        stats.write(&player, path)?;
+        stats.write(&levels, kept, path)?;
     }
     Ok(())
-}
-
-/// The coarsest level that is fine enough for a frame; says which.
-fn fine_enough(asset: &Asset, frame: &Frame) -> Result<Asset> {
-    let pixels = pixels_at_nearest(frame, &asset.info);
-    let choice = Fineness::DEFAULT.choose(&details(asset), pixels, asset.density.is_some());
-    let level = asset.level(choice.level)?;
-    eprintln!("note: level of detail {}: {} samples", choice.level, level.samples.len());
-    Ok(level)
-}
-
-/// Says why something else draws than one might expect.
-fn tell(player: &mut Player) {
-    if let Some(note) = player.take_note() {
-        eprintln!("note: {note}");
-    }
 }
 
 fn format_of(output: &Path) -> Result<Format> {

@@ -3,6 +3,7 @@
 mod args;
 mod bench;
 mod headless;
+mod levels;
 mod stats;
 #[cfg(feature = "window")]
 mod window;

@@ -1,5 +1,6 @@
 //! Counts and timings as JSON.
 
+use crate::levels::{Kept, Levels};
 use anyhow::Result;
 use diaphane_formats::files;
 use diaphane_runtime::exact::ExactReport;
@@ -19,11 +20,18 @@ pub struct Stats {
     adapter: String,
     /// How a GPU summed the kernels.
     splat: Option<&'static str>,
+    /// Why in this way.
+    splat_why: Option<&'static str>,
+    /// Whether a GPU's `pass_ms` are by its own clock; else they are one entry, measured outside.
+    clock: Option<bool>,
+    /// Why another backend draws than would have been preferred, and what else was said on the way.
+    notes: Vec<String>,
     /// Parts that the samples were cut into, where a GPU's bindings are too small for all of them.
     shards: Option<usize>,
     width: u32,
     height: u32,
     samples_per_pixel: u32,
+    /// Of the level of detail that was drawn last.
     samples: u64,
     samples_drawn: u64,
     /// As played, at density 1, 1 / mesh unit.
@@ -39,6 +47,8 @@ pub struct Stats {
     /// Lights of the scene's list.
     scene_lights: usize,
     frames: u32,
+    /// Which levels of detail kept the frames in a budget of time, where one was given.
+    budget: Option<Kept>,
     /// Mean number of kernels over the rays that hit the object.
     splats_per_pixel: f64,
     frame_ms: Spread,
@@ -78,6 +88,9 @@ impl Stats {
             backend,
             adapter,
             splat: player.path().map(SplatPath::name),
+            splat_why: player.why_path(),
+            clock: player.has_clock(),
+            notes: Vec::new(),
             shards: player.shards(),
             width: frame.width,
             height: frame.height,
@@ -91,6 +104,7 @@ impl Stats {
             exact: ExactReport::default(),
             scene_lights: frame.scene_lights,
             frames,
+            budget: None,
             splats_per_pixel: 0.0,
             frame_ms: Spread::default(),
             pass_ms: BTreeMap::new(),
@@ -113,11 +127,17 @@ impl Stats {
         self.splats_per_pixel = rendered.counters.splats_per_ray();
     }
 
-    /// Writes everything to `path`. The backend is the one that drew the last frame.
-    pub fn write(mut self, player: &Player, path: &Path) -> Result<()> {
-        (self.backend, self.adapter) = player.describe();
-        self.splat = player.path().map(SplatPath::name);
-        self.shards = player.shards();
+    /// Writes everything to `path`. The backend is the one that drew the last frame of `levels`.
+    pub fn write(mut self, levels: &Levels, budget: Option<Kept>, path: &Path) -> Result<()> {
+        self.notes = levels.notes().to_vec();
+        if let Some(player) = levels.last() {
+            (self.backend, self.adapter) = player.describe();
+            self.splat = player.path().map(SplatPath::name);
+            (self.splat_why, self.clock) = (player.why_path(), player.has_clock());
+            self.shards = player.shards();
+            self.samples = player.info().samples;
+        }
+        self.budget = budget;
         self.frame_ms = Spread::of(&self.frame_times);
         self.pass_ms = self.pass_times.iter().map(|(name, times)| (*name, Spread::of(times))).collect();
         let mut json = serde_json::to_string_pretty(&self)?;

@@ -91,3 +91,15 @@ pub struct HostReport {
     /// Whether the last picture still holds, so that nothing was recorded.
     pub reused: bool,
 }
+
+impl super::Renderer {
+    /// Which levels of detail are fine enough from the next frame on; a [`crate::detail::Governor`] tells it from the times of frames and
+    /// [`HostReport::samples`].
+    pub fn set_fineness(&mut self, fineness: Fineness) {
+        if fineness != self.fineness {
+            self.fineness = fineness;
+            // The last picture holds no longer.
+            self.seen = None;
+        }
+    }
+}

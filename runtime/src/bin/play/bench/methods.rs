@@ -9,6 +9,7 @@ use diaphane_runtime::frame::Frame;
 use diaphane_runtime::gpu::rivals::{Drawn, Rivals, Settings};
 use diaphane_runtime::player::{LightMode, Player};
 use serde::Serialize;
+use std::sync::Arc;
 
 /// How a picture is made.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -133,7 +134,7 @@ impl<'a> Contest<'a> {
         let rendered = self.player.render(frame, LightMode::Baked)?;
         let wall = started.elapsed().as_secs_f64() * 1e3;
         let clock = rendered.passes.iter().map(|(_, ms)| ms).sum();
-        Ok((rendered.picture, if self.by_adapter { clock } else { wall }))
+        Ok((Arc::unwrap_or_clone(rendered.picture), if self.by_adapter { clock } else { wall }))
     }
 
     fn march(&mut self, frame: &Frame, effort: Effort) -> Result<(Picture, f64)> {

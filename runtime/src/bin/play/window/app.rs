@@ -2,7 +2,7 @@
 
 use super::Errand;
 use super::health::Retries;
-use super::pace::Pace;
+use super::levels::Levels;
 use super::panel;
 use super::reload::PERIOD;
 use super::screen::Screen;
@@ -30,6 +30,8 @@ pub struct App {
     pub(super) title: String,
     pub(super) errand: Option<Errand>,
     pub(super) exposure: Option<f32>,
+    /// Milliseconds a frame while something moves, where levels of detail are to keep it.
+    budget: Option<f64>,
     pub(super) message: String,
     pub(super) view: Option<View>,
     pub(super) sources: Sources,
@@ -45,7 +47,7 @@ pub struct App {
 pub(super) struct View {
     pub screen: Screen,
     pub input: egui_winit::State,
-    pub pace: Pace,
+    pub levels: Levels,
     pub adapter: String,
     /// Left, top, width, height of the picture in pixels.
     pub place: [f32; 4],
@@ -65,17 +67,33 @@ pub(super) struct Shown {
     pub mode: LightMode,
     pub edit: Edit,
     pub exact: Option<ExactDepths>,
+    /// Of detail.
+    pub level: usize,
     pub rays: u32,
+}
+
+impl Shown {
+    /// Exact depths are those of all samples: coarser levels, which are shown while something moves, are lit by baked ones.
+    pub fn exact(&self) -> Option<&ExactDepths> {
+        self.exact.as_ref().filter(|_| self.level == 0)
+    }
 }
 
 impl App {
     /// A window to come: it opens when the system says so.
-    pub fn new(session: Session, sources: Sources, title: String, errand: Option<Errand>) -> Self {
+    pub fn new(
+        session: Session,
+        sources: Sources,
+        title: String,
+        errand: Option<Errand>,
+        budget: Option<f64>,
+    ) -> Self {
         Self {
             session,
             title,
             errand,
             exposure: None,
+            budget,
             message: String::new(),
             view: None,
             sources,
@@ -105,7 +123,7 @@ impl App {
             .with_inner_size(size);
         let window =
             event_loop.create_window(attributes).map_err(|e| anyhow!("no window can be opened: {e}"))?;
-        self.view = Some(View::new(Arc::new(window), &self.session.asset)?);
+        self.view = Some(View::new(Arc::new(window), &self.session.asset, self.budget)?);
         Ok(())
     }
 
@@ -123,8 +141,8 @@ impl App {
         let (place, pointer, frames) = (old.place, old.pointer, old.frames);
         // What is left of it may be all the memory that there is, and holds the window's surface.
         drop(old);
-        let view =
-            View::new(window, &self.session.asset).map_err(|e| anyhow!("{failure}; opened again: {e:#}"))?;
+        let view = View::new(window, &self.session.asset, self.budget)
+            .map_err(|e| anyhow!("{failure}; opened again: {e:#}"))?;
         self.message = format!("the GPU was opened again: {failure}");
         eprintln!("note: {}", self.message);
         view.screen.window.request_redraw();
@@ -138,7 +156,7 @@ impl App {
         if now < self.look {
             return;
         }
-        if let Some(message) = self.sources.look(&mut self.session, self.view.as_mut()) {
+        if let Some(message) = self.sources.look(&mut self.session, self.view.as_mut(), self.budget) {
             eprintln!("note: {message}");
             self.message = message;
             if let Some(view) = &self.view {
@@ -204,7 +222,7 @@ impl App {
 }
 
 impl View {
-    fn new(window: Arc<Window>, asset: &Asset) -> Result<Self> {
+    fn new(window: Arc<Window>, asset: &Asset, budget: Option<f64>) -> Result<Self> {
         let screen = Screen::new(window, asset)?;
         let side = screen.gpu.device.limits().max_texture_dimension_2d as usize;
         let window = &screen.window;
@@ -218,7 +236,7 @@ impl View {
         );
         Ok(Self {
             input,
-            pace: Pace::new(screen.gpu.is_software()),
+            levels: Levels::new(asset, budget, screen.gpu.is_software()),
             adapter: screen.gpu.describe(),
             place: [0.0; 4],
             pointer: PhysicalPosition::default(),

@@ -1,6 +1,7 @@
 //! The window's frames: panel, picture, screenshots.
 
 use super::app::{App, Shown};
+use super::levels::Chosen;
 use super::panel::{self, Action, Contents, Numbers};
 use super::save::save;
 use super::screen::{Painting, Screen};
@@ -28,10 +29,16 @@ impl App {
         let context = view.input.egui_ctx().clone();
         view.input.handle_platform_output(&view.screen.window, output.platform_output);
         let moving = self.errand.is_none() && view.changed.elapsed() < SETTLING;
-        let divisor = view.pace.divisor(moving);
-        let frame = self.session.frame(view.place, divisor)?;
+        let whole = self.session.frame(view.place, 1)?;
+        let chosen = view.levels.choose(moving, &whole, &self.session.asset.info);
+        let Chosen { level, divisor } = chosen;
+        let frame = if divisor == 1 { whole } else { self.session.frame(view.place, divisor)? };
         let (mode, edit) = (self.session.mode, self.session.edit);
-        let same = view.shown.as_ref().is_some_and(|s| s.frame == frame && s.mode == mode && s.edit == edit);
+        let same = view
+            .shown
+            .as_ref()
+            .is_some_and(|s| s.frame == frame && s.mode == mode && s.edit == edit && s.level == level);
+        let switched = view.screen.level() != level;
         if !same {
             // A finer or coarser picture of the same is no change; rounding its size moves the right edge a little.
             let stays = view.shown.as_ref().is_some_and(|s| {
@@ -42,14 +49,17 @@ impl App {
             if !stays {
                 view.changed = Instant::now();
             }
-            if view.shown.as_ref().is_none_or(|s| s.edit != edit) {
-                view.screen.set_material(&self.session.set_material()?);
+            if switched {
+                view.screen.set_level(&self.session.asset, level)?;
+            }
+            if switched || view.shown.as_ref().is_none_or(|s| s.edit != edit) {
+                view.screen.set_material(&view.levels.info(level, self.session.set_material()?));
             }
         }
         let exact = self.session.advance(&frame, view.frame_ms);
         // Light that goes from baked to exact depths is drawn anew, but nothing moves.
         if !same || view.shown.as_ref().is_some_and(|s| s.exact != exact) {
-            view.shown = Some(Shown { frame, mode, edit, exact, rays: 0 });
+            view.shown = Some(Shown { frame, mode, edit, exact, level, rays: 0 });
         }
         let Some(shown) = &mut view.shown else {
             return Ok(());
@@ -61,8 +71,7 @@ impl App {
         let exposure = self.exposure.unwrap_or(1.0);
         let wanted = if view.screen.renderer.tiles() > 1 { 1 } else { RAYS };
         let rays = shown.rays..(shown.rays + 1).min(wanted).max(shown.rays);
-        let request =
-            Request { frame: &shown.frame, exact: shown.exact.as_ref(), rays: rays.clone(), exposure };
+        let request = Request { frame: &shown.frame, exact: shown.exact(), rays: rays.clone(), exposure };
         let capture = self.errand.as_ref().is_some_and(|e| view.frames + 1 >= e.frames);
         let painting = Painting {
             request: (!rays.is_empty()).then_some(request),
@@ -78,9 +87,9 @@ impl App {
         view.statistics = view.screen.renderer.statistics().clone();
         view.frames += 1;
         view.frame_ms = started.elapsed().as_secs_f64() * 1e3;
-        // The first frame also compiles what the driver left for later.
-        if !rays.is_empty() && view.frames > 1 {
-            view.pace.learn(divisor, view.frame_ms);
+        // The first frame also compiles what the driver left for later, as does the first one of a level.
+        if !rays.is_empty() && view.frames > 1 && !switched {
+            view.levels.learn(chosen, moving, view.frame_ms - painted.waited.as_secs_f64() * 1e3);
         }
         if let Some((width, height, rgb)) = painted.capture
             && let Some(errand) = self.errand.take()
@@ -151,6 +160,7 @@ impl App {
                         rays: shown.map_or(0, |s| s.rays),
                         rays_wanted: RAYS,
                         samples: self.session.asset.info.samples,
+                        level: view.levels.are_governed().then_some(view.screen.level()),
                         statistics: &view.statistics,
                         exact: &exact,
                     },
@@ -176,10 +186,14 @@ impl App {
             Action::ResetCamera => self.session.orbit = self.session.first_orbit,
             Action::MeasureExposure => self.exposure = None,
             Action::SavePng | Action::SaveExr => {
-                let rays = view.pace.expected(1).map_or(f64::from(RAYS), |ms| SAVING / ms.max(1e-3));
+                let rays = view.levels.expected().map_or(f64::from(RAYS), |ms| SAVING / ms.max(1e-3));
                 let mut frame = self.session.frame(view.place, 1)?;
                 frame.samples_per_pixel = (rays as u32).clamp(1, RAYS);
                 let exact = view.shown.take().and_then(|s| s.exact);
+                if view.screen.level() > 0 {
+                    view.screen.set_level(&self.session.asset, 0)?;
+                    view.screen.set_material(&self.session.set_material()?);
+                }
                 let picture = draw_fine(&mut view.screen, &frame, exact.as_ref())?;
                 let exposure = self.exposure.filter(|_| action == Action::SavePng);
                 // A full disk is no reason to close the window.
@@ -199,7 +213,7 @@ fn measure_exposure(screen: &mut Screen, shown: &Shown) -> Result<f32> {
     let mut small = shown.frame.clone();
     small.width = (small.width / 4).clamp(1, 128);
     small.height = (small.height / 4).clamp(1, 128);
-    let request = Request { frame: &small, exact: shown.exact.as_ref(), rays: 0..1, exposure: 1.0 };
+    let request = Request { frame: &small, exact: shown.exact(), rays: 0..1, exposure: 1.0 };
     screen.draw(&request)?;
     Ok(Display::automatic(&screen.renderer.read_picture(&screen.gpu.device, &screen.gpu.queue)?).exposure)
 }

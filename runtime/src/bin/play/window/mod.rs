@@ -3,6 +3,7 @@
 mod app;
 mod frames;
 mod health;
+mod levels;
 mod orbit;
 mod pace;
 mod panel;
@@ -65,7 +66,7 @@ pub fn run(args: &Args) -> Result<()> {
         anyhow!("no display to open a window on ({reason}); draw a picture with --output instead")
     })?;
     let title = args.asset.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
-    let mut app = App::new(session, sources, title, errand);
+    let mut app = App::new(session, sources, title, errand, args.budget);
     event_loop.run_app(&mut app).context("the window failed")?;
     app.finish()
 }

@@ -15,12 +15,19 @@ pub struct Pace {
     /// Milliseconds of a frame with one ray in each pixel, by level; `None` where none was drawn yet.
     known: [Option<f64>; LEVELS],
     first: u32,
+    /// Milliseconds a frame may take while something moves.
+    moving: f64,
 }
 
 impl Pace {
     /// Software adapters start with coarse pictures.
     pub fn new(software: bool) -> Self {
-        Self { known: [None; LEVELS], first: if software { 4 } else { 1 } }
+        Self::within(MOVING, software)
+    }
+
+    /// The same with so many milliseconds for a frame while something moves.
+    pub fn within(moving: f64, software: bool) -> Self {
+        Self { known: [None; LEVELS], first: if software { 4 } else { 1 }, moving }
     }
 
     /// What a frame of one ray in each pixel cost. What is known of other sizes changes in proportion.
@@ -34,6 +41,10 @@ impl Pace {
         let ratio = self.known[level].map_or(1.0, |old| now / old);
         self.known.iter_mut().flatten().for_each(|v| *v *= ratio);
         self.known[level] = Some(now);
+        // No more than in proportion to the pixels, or what was slow once would not be tried again.
+        for (k, finer) in self.known[..level].iter_mut().enumerate() {
+            *finer = finer.map(|ms| ms.min(now * 4f64.powi((level - k) as i32)));
+        }
     }
 
     /// Milliseconds that a ray in each pixel will take; `None` before the first frame.
@@ -45,7 +56,7 @@ impl Pace {
 
     /// 1, 2, 4 or 8.
     pub fn divisor(&self, moving: bool) -> u32 {
-        let budget = if moving { MOVING } else { RESTING };
+        let budget = if moving { self.moving } else { RESTING };
         let coarsest = 1 << (LEVELS - 1);
         let fits = |divisor: u32| self.expected(divisor).map(|ms| ms <= budget);
         match fits(1) {
@@ -77,6 +88,16 @@ mod tests {
         assert!((pace.expected(2).unwrap() - 527.8).abs() < 0.1);
         pace.learn(8, f64::NAN);
         assert_eq!(pace.divisor(false), 4);
+    }
+
+    #[test]
+    fn what_was_slow_once_is_tried_again() {
+        let mut pace = Pace::new(false);
+        pace.learn(1, 500.0);
+        assert_eq!(pace.divisor(true), 8);
+        // Something else took the time then.
+        (0..8).for_each(|_| pace.learn(pace.divisor(true), 5.0));
+        assert_eq!(pace.divisor(true), 1);
     }
 
     #[test]

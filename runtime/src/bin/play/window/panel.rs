@@ -40,6 +40,8 @@ pub struct Numbers<'a> {
     pub rays: u32,
     pub rays_wanted: u32,
     pub samples: u64,
+    /// Of detail, where they are chosen by a budget.
+    pub level: Option<usize>,
     pub statistics: &'a Statistics,
     /// Of the last frame.
     pub exact: &'a ExactReport,
@@ -83,6 +85,10 @@ fn statistics(ui: &mut Ui, numbers: &Numbers) {
         row("picture", format!("{} x {}", numbers.size[0], numbers.size[1]));
         row("rays a pixel", format!("{} of {}", numbers.rays, numbers.rays_wanted));
         row("samples", format!("{} of {}", counters.samples_drawn, numbers.samples));
+        if let Some(level) = numbers.level {
+            let light = if level > 0 { ", baked light" } else { "" };
+            row("level of detail", format!("{level}{light}"));
+        }
         let census = &counters.census;
         let share = |n: u64| n / census.views.max(1);
         row("shown, hidden", format!("{}, {}", share(census.samples_shown), share(census.samples_hidden)));

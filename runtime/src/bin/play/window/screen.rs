@@ -8,7 +8,7 @@ use diaphane_runtime::gpu::{GpuDevice, PictureRenderer, Request, guarded, instan
 use egui::{ClippedPrimitive, TexturesDelta};
 use egui_wgpu::{RendererOptions, ScreenDescriptor};
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 use wgpu::{
     Color, CommandEncoder, CurrentSurfaceTexture, Extent3d, Instance, LoadOp, Operations, PresentMode,
     RenderPassColorAttachment, RenderPassDescriptor, StoreOp, Surface, SurfaceConfiguration, Texture,
@@ -29,6 +29,9 @@ pub struct Screen {
     pub window: Arc<Window>,
     pub gpu: GpuDevice,
     pub renderer: PictureRenderer,
+    /// Which level of detail that is, and the renderers of others that were shown.
+    level: usize,
+    parked: Vec<(usize, PictureRenderer)>,
     instance: Instance,
     surface: Surface<'static>,
     health: Health,
@@ -60,6 +63,8 @@ pub struct Painted {
     pub capture: Option<Capture>,
     /// After how long to try again where the window took no picture.
     pub again: Option<Duration>,
+    /// How long the window had no picture to draw on.
+    pub waited: Duration,
 }
 
 /// What the window showed: columns, rows, RGB bytes.
@@ -100,7 +105,8 @@ impl Screen {
         let panel = egui_wgpu::Renderer::new(&gpu.device, format, RendererOptions::default());
         gpu.check()?;
         let health = Health::default();
-        Ok(Self { window, gpu, renderer, instance, surface, health, visible, config, panel })
+        let (level, parked) = (0, Vec::new());
+        Ok(Self { window, gpu, renderer, level, parked, instance, surface, health, visible, config, panel })
     }
 
     /// Shows another asset; the old one stays where that fails.
@@ -111,7 +117,32 @@ impl Screen {
         let next = PictureRenderer::new(&self.gpu.device, &self.gpu.queue, asset, self.config.format)?;
         self.gpu.check()?;
         self.renderer = next;
+        self.level = 0;
+        self.parked.clear();
         Ok(())
+    }
+
+    /// Shows another level of detail of the asset, with its baked material.
+    ///
+    /// # Errors
+    /// A level that there is not, or that does not fit the adapter beside the others.
+    pub fn set_level(&mut self, asset: &Asset, level: usize) -> Result<()> {
+        let next = match self.parked.iter().position(|(parked, _)| *parked == level) {
+            Some(at) => self.parked.swap_remove(at).1,
+            None => {
+                let alone = asset.level(level)?;
+                PictureRenderer::new(&self.gpu.device, &self.gpu.queue, &alone, self.config.format)?
+            }
+        };
+        self.gpu.check()?;
+        let last = std::mem::replace(&mut self.renderer, next);
+        self.parked.push((std::mem::replace(&mut self.level, level), last));
+        Ok(())
+    }
+
+    /// The level of detail that is shown.
+    pub fn level(&self) -> usize {
+        self.level
     }
 
     /// Whether there is anything to draw on.
@@ -199,7 +230,9 @@ impl Screen {
             // Command buffers come back only from paint callbacks, which the panel does not use.
             let _ = self.panel.update_buffers(device, queue, &mut encoder, jobs, &descriptor);
         })?;
+        let asked = Instant::now();
         let texture = self.surface.get_current_texture();
+        let waited = asked.elapsed();
         let next = self.health.next(Acquired::from(&texture));
         let shown = match texture {
             CurrentSurfaceTexture::Success(t) | CurrentSurfaceTexture::Suboptimal(t) => Some(t),
@@ -230,7 +263,7 @@ impl Screen {
             complaint?;
         }
         let capture = copy.map(|copy| self.read(&copy)).transpose()?;
-        Ok(Painted { capture, again: self.mend(next)? })
+        Ok(Painted { capture, again: self.mend(next)?, waited })
     }
 
     /// Does to the surface what is due. Returns after how long to try again where the window took no picture.

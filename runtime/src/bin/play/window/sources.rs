@@ -1,6 +1,7 @@
 //! The files that the window shows: asset and scene, read again when they change.
 
 use super::app::View;
+use super::levels::Levels;
 use super::reload::{Look, Watch};
 use super::session::Session;
 use anyhow::Result;
@@ -22,10 +23,15 @@ impl Sources {
 
     /// Takes over what has changed. Returns what to tell: what was read again, or what could not be and why; the session then stays
     /// as it was.
-    pub fn look(&mut self, session: &mut Session, view: Option<&mut View>) -> Option<String> {
+    pub fn look(
+        &mut self,
+        session: &mut Session,
+        view: Option<&mut View>,
+        budget: Option<f64>,
+    ) -> Option<String> {
         let mut told = Vec::new();
         let found = self.asset.look(asset::read);
-        told.extend(tell(self.asset.path(), found, |asset| show(session, view, asset)));
+        told.extend(tell(self.asset.path(), found, |asset| show(session, view, asset, budget)));
         if let Some(scene) = &mut self.scene {
             let found = scene.look(scene::load);
             told.extend(tell(scene.path(), found, |scene| session.replace_scene(scene)));
@@ -56,7 +62,7 @@ fn tell<T>(
 }
 
 /// Shows another asset, on the GPU and in the session or in neither.
-fn show(session: &mut Session, view: Option<&mut View>, asset: Asset) -> Result<()> {
+fn show(session: &mut Session, view: Option<&mut View>, asset: Asset, budget: Option<f64>) -> Result<()> {
     let Some(view) = view else { return session.replace_asset(asset) };
     view.screen.set_asset(&asset)?;
     view.shown = None;
@@ -64,5 +70,6 @@ fn show(session: &mut Session, view: Option<&mut View>, asset: Asset) -> Result<
         view.screen.set_asset(&session.asset)?;
         return Err(e);
     }
+    view.levels = Levels::new(&session.asset, budget, view.screen.gpu.is_software());
     Ok(())
 }
