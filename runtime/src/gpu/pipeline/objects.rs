@@ -57,6 +57,7 @@ impl Pipeline {
 
     /// Remembers what the sources depend on that are made now.
     pub(super) fn keep_lit(&mut self) {
+        self.lit.resize(self.asset.slots, None);
         for (slot, key) in self.pending.drain(..) {
             self.lit[slot] = Some(key);
         }
