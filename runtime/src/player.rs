@@ -288,6 +288,8 @@ impl Player {
     ) -> Result<Rendered> {
         // What is left of the old one may be all the memory that there is.
         self.engine = Engine::Closed;
+        self.tracer.use_cpu();
+        self.spread.iter_mut().for_each(Spread::use_cpu);
         let again = gpu().and_then(|engine| {
             self.replace(engine);
             self.render(frame, mode)

@@ -10,6 +10,7 @@ use workbench::Workbench;
 const BENCH: [&str; 8] = ["bench", "ball.dph", "--backend", "cpu", "--part", "axes", "--frames", "1"];
 const BAKE: [&str; 9] =
     ["ball.obj", "--material", "m.toml", "--output", "new.dph", "--samples", "200", "--directions", "32"];
+const PLAY: [&str; 6] = ["ball.dph", "--backend", "cpu", "--level", "auto", "--output"];
 const IMAGE: [&str; 9] =
     ["image", "ball.dph", "ball.obj", "--material", "m.toml", "--scene", "s.toml", "--backend", "cpu"];
 
@@ -63,4 +64,7 @@ fn a_file_that_was_asked_for_is_written() {
     assert!(command.stdout(closed()).status().unwrap().success());
     let text = std::fs::read_to_string(bench.path("b.json")).unwrap();
     assert!(text.contains("rows") && text.contains("skipped"));
+    let Some(mut command) = bench.command("play", &[&PLAY[..], &["x.png"]].concat()) else { return };
+    assert!(command.stdout(closed()).stderr(closed()).status().unwrap().success());
+    assert!(bench.path("x.png").is_file());
 }

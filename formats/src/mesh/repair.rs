@@ -26,13 +26,15 @@ pub(super) fn repair(positions: Vec<DVec3>, triangles: Vec<[u32; 3]>) -> Result<
         return Err(Error::invalid("has only triangles without area; a closed mesh with volume is needed"));
     }
     let faces = triangles.len();
-    let (mut turned, pieces) = oriented(&positions, &mut triangles, &mut report);
+    let (mut turned, pieces, tatters) = oriented(&positions, &mut triangles, &mut report);
     let shells = shells::gather(&mut positions, &triangles, &pieces, &mut report);
     let fates = shells::nest(&shells, &mut report);
-    // Of what is torn, bits may have an inside by chance: open shells of less than half of the faces are no object.
-    let solid = || shells.iter().zip(&fates).filter(|(_, fate)| **fate != Fate::Flat).map(|(shell, _)| shell);
-    let left: usize = solid().map(|shell| shell.members.len()).sum();
-    if solid().all(|shell| !shell.patches.is_empty()) && faces >= islands::FEW && 2 * left < faces {
+    // Of what is torn, bits may have an inside by chance: open shells that are less than the tatters beside them are no object.
+    let (flat, solid): (Vec<_>, Vec<_>) =
+        shells.iter().zip(&fates).partition(|(_, fate)| **fate == Fate::Flat);
+    let count = |some: &[(&shells::Shell, &Fate)]| some.iter().map(|(s, _)| s.members.len()).sum::<usize>();
+    let are_open = solid.iter().all(|(shell, _)| !shell.patches.is_empty());
+    if are_open && faces >= islands::FEW && count(&solid) < count(&flat) + tatters {
         report.mending.sheets += shells.len();
         return Err(no_inside(&report));
     }
@@ -79,12 +81,13 @@ fn retain(triangles: &mut Vec<[u32; 3]>, keep: impl Fn(usize) -> bool) {
     });
 }
 
-/// Pieces without open sheets, and which triangles were turned. Where a sheet goes, what it hung on may hang together.
+/// Pieces without open sheets, which triangles were turned, and how many faces of tatters went with the sheets: of torn ones and of
+/// few faces. Where a sheet goes, what it hung on may hang together.
 fn oriented(
     positions: &[DVec3],
     triangles: &mut Vec<[u32; 3]>,
     report: &mut MeshReport,
-) -> (Vec<bool>, Pieces) {
+) -> (Vec<bool>, Pieces, usize) {
     let given = triangles.clone();
     let mut pieces = pieces::orient(positions, triangles);
     if let Some(mended) = seams::mend(positions, &given, &pieces.lone_edges, report) {
@@ -94,11 +97,15 @@ fn oriented(
     islands::join(positions, triangles, &mut pieces);
     pieces.describe(report);
     let mut turned = std::mem::take(&mut pieces.turned);
+    let mut tatters = 0;
     loop {
         let gone = sheets::find(positions, triangles, &pieces, report);
         if !gone.contains(&true) {
-            return (turned, pieces);
+            return (turned, pieces, tatters);
         }
+        let own = pieces.members.iter().zip(&pieces.torn);
+        let small = own.filter(|(m, torn)| **torn || m.len() < islands::FEW).map(|(m, _)| m);
+        tatters += small.flatten().filter(|t| gone[**t as usize]).count();
         retain(triangles, |i| !gone[i]);
         let mut gone = gone.iter();
         turned.retain(|_| gone.next() == Some(&false));

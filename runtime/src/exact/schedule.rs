@@ -164,9 +164,20 @@ impl Schedule {
         self.settings.milliseconds = milliseconds;
     }
 
-    /// Sets the bytes that complete depths may take from now on.
+    /// Sets the bytes that complete depths may take from now on; what is more goes, that which was of no use for longest first.
     pub fn set_memory(&mut self, bytes: u64) {
         self.settings.memory = bytes;
+        while self.kept_bytes() > bytes {
+            let oldest = self.kept.iter().min_by_key(|(place, (_, used))| (*used, place.at));
+            let Some(place) = oldest.map(|(place, _)| *place) else { break };
+            self.kept.remove(&place);
+            self.evicted += 1;
+        }
+    }
+
+    /// Bytes of the depths that are kept.
+    pub fn kept_bytes(&self) -> u64 {
+        self.kept.values().map(|(entry, _)| bytes(entry.depths.values().len())).sum()
     }
 
     /// Whether the next frames will differ from this one although nothing moves.

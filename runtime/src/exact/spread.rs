@@ -33,9 +33,19 @@ impl Spread {
         Self { tracer, schedule: Schedule::new(settings), info }
     }
 
-    /// Samples of the asset.
-    pub fn samples(&self) -> usize {
-        self.tracer.samples()
+    /// Bytes of the depths that are kept.
+    pub fn kept_bytes(&self) -> u64 {
+        self.schedule.kept_bytes()
+    }
+
+    /// Builds what the first light would have to wait for.
+    pub fn prepare(&self) {
+        self.tracer.prepare();
+    }
+
+    /// Traces on the CPU from now on.
+    pub fn use_cpu(&mut self) {
+        self.tracer.use_cpu();
     }
 
     /// Sets the bytes that complete depths may take from now on.

@@ -146,6 +146,11 @@ impl DepthTracer {
         self.is_on_gpu()
     }
 
+    /// Traces on the CPU from now on.
+    pub fn use_cpu(&mut self) {
+        self.gpu = None;
+    }
+
     /// Whether a GPU traces.
     pub fn is_on_gpu(&self) -> bool {
         self.gpu.as_ref().is_some_and(|g| !g.failed.load(Ordering::Relaxed))
@@ -211,11 +216,6 @@ impl DepthTracer {
     /// Parameters of the asset, extinction and albedo as they are played.
     pub fn info(&self) -> &Info {
         &self.info
-    }
-
-    /// Number of samples.
-    pub fn samples(&self) -> usize {
-        self.level.places.len()
     }
 
     /// What the last call of [`Self::trace`] did.

@@ -6,7 +6,7 @@ use super::frame::most_bound;
 use super::mesh::{self, MeshPart};
 use super::packed;
 use super::shard::{SOURCE, Shard, Source, ranges};
-use super::slabs::{MOST_SLABS, Slabs};
+use super::slabs::Slabs;
 use super::splatting::SplatPath;
 use super::targets::PixelState;
 use super::uniforms::MediumUniform;
@@ -101,7 +101,7 @@ impl AssetBuffers {
         let fits = Fits::new(device);
         fits.bound("values of the samples", 16 * kernels.len())?;
         let slabs = Slabs::new(device, asset.density.as_ref(), fits.binding)
-            .ok_or_else(|| fits.refuse("density grid", 4 * grid.len() / MOST_SLABS))?;
+            .ok_or_else(|| fits.refuse("voxels (six slabs of whole layers at the most)", 4 * grid.len()))?;
         material.grid_layers = slabs.layers;
         if asset.mesh_triangles.len() > (u32::MAX / 3) as usize {
             return Err(Error::Gpu("the mesh has too many triangles; use the CPU backend".to_owned()));

@@ -47,10 +47,13 @@ pub struct GpuDepths {
 }
 
 impl GpuDepths {
-    /// For an asset of even density whose values hold at `places`; `None` where shells overlap, or the mesh or the samples are too
+    /// For an asset of even density whose values hold at `places`; `None` where shells overlap or cross themselves, or the mesh or the samples are too
     /// large for a binding.
     pub fn new(owned: &GpuDevice, mesh: &Mesh, info: &Info, places: &[Vec3]) -> Option<Self> {
-        let overlap = info.provenance.mesh_report.mending.overlapping > 0;
+        // Where the medium counts once although the boundary encloses it twice.
+        let report = &info.provenance.mesh_report;
+        let overlap =
+            report.mending.overlapping > 0 || report.self_intersections > 0 || report.non_manifold_edges > 0;
         let most = most_bound(&owned.device);
         let too_many = places.is_empty() || places.len() > MOST || 16 * places.len() as u64 > most;
         if overlap || too_many || mesh.triangles.is_empty() {
@@ -134,6 +137,7 @@ impl GpuDepths {
         let failed = |_| Error::Gpu("the device did not hand depths back".to_owned());
         let copy = copies.first().ok_or_else(|| failed(()))?;
         let view = copy.get_mapped_range(..).map_err(|_| failed(()))?;
-        Ok(view.chunks_exact(8).map(bytemuck::pod_read_unaligned).collect())
+        // Buffers are larger than a single sample's depths.
+        Ok(view.chunks_exact(8).take(range.len()).map(bytemuck::pod_read_unaligned).collect())
     }
 }

@@ -150,21 +150,34 @@ impl FrameBuffers {
 
     /// Sees that there is room for the lights of so many slots, so many each. Says whether those that were there are gone.
     pub fn reserve(&mut self, device: &Device, slots: usize, lights: usize) -> Result<bool> {
-        self.light_stride = self.light_stride.max(lights);
         if self.objects.len() < slots {
             self.objects.resize_with(slots, Lights::default);
         }
-        let size = (slots * self.light_stride * size_of::<LightRecord>()) as u64;
+        let bytes = |stride: usize| (slots * stride * size_of::<LightRecord>()) as u64;
         let most = most_bound(device);
+        // What there was room for before, unless that is too much by now.
+        let known = self.light_stride;
+        let stride = if bytes(known.max(lights)) <= most { known.max(lights) } else { lights };
+        let size = bytes(stride);
         if size > most {
             return Err(Error::Gpu(format!(
                 "{lights} lights of {slots} objects do not fit the adapter's buffers ({} MiB)",
                 most >> 20
             )));
         }
-        let gone = grow(device, &mut self.lights, "lights", size);
-        self.changed |= gone;
-        Ok(gone)
+        self.light_stride = stride;
+        let grown = grow(device, &mut self.lights, "lights", size);
+        self.changed |= grown;
+        Ok(grown || stride != known)
+    }
+
+    /// Forgets which tables objects use that are not drawn now.
+    pub fn keep_tables(&mut self, drawn: &[Object<'_>]) {
+        for (slot, object) in self.objects.iter_mut().enumerate() {
+            if !drawn.iter().any(|d| d.slot == slot) {
+                object.tables.clear();
+            }
+        }
     }
 
     /// Writes the lights of some objects and the exact depth tables that serve some of them.

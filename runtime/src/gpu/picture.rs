@@ -48,7 +48,7 @@ pub struct Statistics {
     pub counters: Counters,
 }
 
-/// Draws one asset with a device that somebody else owns, which needs `FLOAT32_BLENDABLE`.
+/// Draws one asset with a device that somebody else owns.
 pub struct PictureRenderer {
     passes: Pipeline,
     publish: Publish,

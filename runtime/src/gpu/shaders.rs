@@ -60,7 +60,7 @@ macro_rules! gather {
 /// Where lanes of a subgroup can talk, and where they cannot.
 pub(super) const GATHER_BY_LANES: &str = gather!("shared/emission", "gather_join", "gather_lanes");
 pub(super) const GATHER_PLAINLY: &str = gather!("shared/emission", "gather_join", "gather_plain");
-/// The same where sums are kept from shard to shard.
+/// The same where sums are kept from shard to shard or slice by slice.
 pub(super) const KEEP_BY_LANES: &str = gather!("gather_keep", "gather_lanes");
 pub(super) const KEEP_PLAINLY: &str = gather!("gather_keep", "gather_plain");
 

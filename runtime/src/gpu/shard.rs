@@ -1,6 +1,7 @@
 //! Samples that share buffers. An adapter binds only so much of a buffer at once (128 MiB are certain): where an asset has more
 //! samples than that holds, they are cut into shards of about equal size. Passes over the samples run shard after shard, and sums
-//! go on from one to the next in the order of the samples, so that a picture does not depend on how many there are.
+//! go on from one to the next in the order of the samples, so that a picture depends on how many there are by
+//! rounding at the most: where several workgroups share a tile each shard is cut into slices of its own.
 
 use super::bindings::{empty_buffer, filled_buffer};
 use super::packed;

@@ -15,11 +15,13 @@ fn add_listed(before: PairSums, count: u32, lane: u32, lanes: u32, rays: Pair) -
     let cosine = subgroupMin(min(dot(rays.left.direction, axis), dot(rays.right.direction, axis))) - 1e-6;
     let cone = Cone(axis, cosine, sqrt(max(1.0 - cosine * cosine, 0.0)), start, sight(latest, end));
     var sums = before;
-    for (var base = 0u; base < count; base += lanes) {
+    // A subgroup may be wider than the workgroup.
+    let together = min(lanes, CLUSTER);
+    for (var base = 0u; base < count; base += together) {
         let own = kernel_of(listed[min(base + lane, count - 1u)]);
         let meets = base + lane < count && own.source.w > 0.0 && may_meet(cone, own.centre, CUT_OFF_RADIUS / own.a);
         let votes = subgroupBallot(meets);
-        for (var word = 0u; 32u * word < lanes; word++) {
+        for (var word = 0u; 32u * word < together; word++) {
             for (var bits = votes[word]; bits != 0u; bits &= bits - 1u) {
                 let k = 32u * word + firstTrailingBit(bits);
                 let kernel = Kernel(subgroupShuffle(own.centre, k), subgroupShuffle(own.a, k),

@@ -7,10 +7,10 @@ use diaphane_formats::asset::Asset;
 use diaphane_formats::scene::{Light, Scene};
 use diaphane_runtime::exact::{DepthTracer, Settings};
 use diaphane_runtime::frame::Frame;
-use diaphane_runtime::gpu::{GpuDevice, Options};
+use diaphane_runtime::gpu::{GpuDepths, GpuDevice, Options};
 use diaphane_runtime::placement::Placement;
 use diaphane_runtime::player::{Backend, LightMode, Player};
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 
 /// All depths of a frame in that frame.
 const QUICK: Settings = Settings { milliseconds: 1e6, ..Settings::DEFAULT };
@@ -69,13 +69,25 @@ fn lights_at_rest_become_exact_without_a_jump_and_lose_it_when_anything_moves() 
     }
     // Nothing moves: nothing is recorded.
     assert_eq!(host.draw(&host_frame(&scene, None)), frames[frames.len() - 1]);
-    assert!(host.renderer.report().reused);
+    assert!(host.renderer.report().reused && host.renderer.report().exact == 1);
 
     // The object moves: the light is elsewhere in its coordinates.
     host.renderer.place(id, Placement { translation: 0.05 * DVec3::X, ..Placement::IDENTITY }).unwrap();
     host.draw(&host_frame(&scene, None));
     assert_eq!(host.renderer.report().exact, 0);
     assert!(host.renderer.is_busy());
+
+    // Out of sight nobody waits for it.
+    let away = Placement {
+        translation: 100.0 * (scene.camera.position - scene.camera.target),
+        ..Placement::IDENTITY
+    };
+    host.renderer.place(id, away).unwrap();
+    host.draw(&host_frame(&scene, None));
+    assert!(host.renderer.report().culled == 1 && !host.renderer.is_busy());
+    host.draw(&host_frame(&scene, None));
+    assert!(host.renderer.report().reused);
+    host.renderer.place(id, Placement::IDENTITY).unwrap();
 
     // A marked light needs no rest.
     let Some(Light::Point { position, .. }) = scene.lights.first_mut() else { panic!("no point light") };
@@ -145,6 +157,11 @@ fn a_gpu_that_cannot_trace_leaves_it_to_the_cpu() {
     let mut tracer = DepthTracer::new(&asset).unwrap();
     assert!(tracer.use_gpu(&gpu));
     let frame = Frame::new(&near_light(), &asset.info).unwrap();
+    // One sample's depths alone are one.
+    let places: Vec<Vec3> = (0..asset.samples.len()).map(|i| asset.samples.centroid(i)).collect();
+    let depths = GpuDepths::new(&gpu, &asset.mesh().unwrap(), &asset.info, &places).unwrap();
+    let all = depths.trace(&frame.lights[0], 0..places.len()).unwrap();
+    assert_eq!(depths.trace(&frame.lights[0], 3..4).unwrap(), all[3..4]);
     gpu.device.destroy();
     let traced = tracer.trace(&frame, &[0]);
     assert!(!tracer.is_on_gpu());

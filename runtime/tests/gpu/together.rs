@@ -46,7 +46,9 @@ fn kinds() -> [Object; 3] {
 
 #[test]
 fn what_is_drawn_together_looks_as_if_drawn_alone() {
-    let Some(GpuDevice { device, queue, .. }) = device() else { return };
+    let Some(gpu) = device() else { return };
+    let software = gpu.is_software();
+    let GpuDevice { device, queue, .. } = gpu;
     for (k, object) in kinds().into_iter().enumerate() {
         let (asset, mut scene) = (object.build(), scene(outside()));
         scene.surface.reflection = true;
@@ -91,7 +93,11 @@ fn what_is_drawn_together_looks_as_if_drawn_alone() {
             }
         }
         // Some are behind the wall.
-        assert!(shown >= 9 && got == expected, "kind {k}: {shown}");
+        assert!(shown >= 9, "kind {k}: {shown}");
+        let worst = got.iter().flatten().zip(expected.iter().flatten()).map(|(a, b)| (a - b).abs());
+        let worst = worst.fold(0.0, f32::max) / peak(&got);
+        // Where workgroups share tiles, as many as keep hardware busy, fewer tiles are cut into more slices; targets are half floats.
+        assert!(worst <= if software { 0.0 } else { 1e-3 }, "kind {k}: {worst}");
     }
 }
 

@@ -43,7 +43,7 @@ pub fn run(args: &Args, output: &Path) -> Result<()> {
     let mut levels = Levels::new(args, asset, &frame)?;
     let mut stats = Stats::new(levels.player()?, &frame, args.frames);
     if let Some(warning) = args.edit().warning() {
-        eprintln!("warning: {warning}");
+        crate::tell(&format!("warning: {warning}"));
     }
     let mut rendered = None;
     for _ in 0..args.frames {
@@ -90,15 +90,15 @@ fn check_paths(args: &Args, output: &Path) -> Result<()> {
 
 fn warn(frame: &Frame, info: &asset::Info, mode: LightMode) {
     if frame.lights.is_empty() {
-        eprintln!("warning: the scene has no lights; the picture will be black");
+        crate::tell("warning: the scene has no lights; the picture will be black");
     }
     let inside = frame.lights_inside(info);
     if mode == LightMode::Baked && !inside.is_empty() {
         let list: Vec<String> = inside.iter().map(|i| (i + 1).to_string()).collect();
-        eprintln!(
+        crate::tell(&format!(
             "warning: light {} stands inside the object's bounding box, where baked depths run past it; use --light auto",
             list.join(", ")
-        );
+        ));
     }
 }
 

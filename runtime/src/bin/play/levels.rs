@@ -58,7 +58,7 @@ impl<'a> Levels<'a> {
         let choose = chooser(&self.asset, frame);
         let level = choose(Fineness::DEFAULT);
         self.asset = self.asset.level(level)?;
-        eprintln!("note: level of detail {level}: {} samples", self.asset.samples.len());
+        crate::tell(&format!("note: level of detail {level}: {} samples", self.asset.samples.len()));
         Ok(())
     }
 
@@ -126,12 +126,12 @@ impl<'a> Levels<'a> {
         let used = kept.frames.iter().enumerate().filter(|(_, frames)| **frames > 0);
         let used: Vec<String> = used.map(|(level, frames)| format!("{level} in {frames} frames")).collect();
         let last = self.last().map_or(0, |player| player.info().samples);
-        eprintln!(
+        crate::tell(&format!(
             "note: levels of detail for {} ms a frame: {}; the last one {} with {last} samples",
             kept.milliseconds,
             used.join(", "),
             kept.level
-        );
+        ));
         Some(kept)
     }
 }
@@ -156,7 +156,7 @@ fn open(args: &Args, asset: &Asset, notes: &mut Vec<String>) -> Result<Player> {
 /// Says why something else draws than one might expect.
 fn tell(note: Option<String>, notes: &mut Vec<String>) {
     let Some(note) = note else { return };
-    eprintln!("note: {note}");
+    crate::tell(&format!("note: {note}"));
     if !notes.contains(&note) {
         notes.push(note);
     }

@@ -18,7 +18,9 @@ impl Tracers {
         let coarser = (1..asset.level_sizes().len())
             .map(|k| Ok(all.for_level(&asset.level(k)?)))
             .collect::<Result<Vec<_>>>()?;
-        Ok(Self(std::iter::once(all).chain(coarser).collect()))
+        let tracers: Vec<DepthTracer> = std::iter::once(all).chain(coarser).collect();
+        tracers.iter().for_each(DepthTracer::prepare);
+        Ok(Self(tracers))
     }
 }
 
@@ -36,14 +38,10 @@ impl Spreads {
             {
                 let mut spread = Spread::with(tracer.another(), settings);
                 spread.set_material(info);
+                spread.prepare();
                 self.0.push((*level, spread));
             }
         }
-    }
-
-    /// Samples of all levels.
-    pub fn samples(&self) -> usize {
-        self.0.iter().map(|(_, s)| s.samples()).sum()
     }
 
     pub fn set_material(&mut self, info: &Info) {
@@ -58,8 +56,9 @@ impl Spreads {
     pub fn advance(&mut self, level: usize, frame: &Frame, pool: &mut Budget) -> Option<ExactDepths> {
         let (_, spread) = self.0.iter_mut().find(|(known, _)| *known == level)?;
         spread.set_milliseconds(pool.milliseconds);
-        spread.set_memory(pool.bytes_per_sample.saturating_mul(spread.samples() as u64));
+        spread.set_memory(pool.bytes);
         let exact = spread.advance(frame, LightMode::Auto);
+        pool.bytes = pool.bytes.saturating_sub(spread.kept_bytes());
         let report = spread.report();
         pool.milliseconds = (pool.milliseconds - report.milliseconds).max(0.0);
         pool.exact += report.exact;
@@ -72,7 +71,7 @@ impl Spreads {
 /// What is left for the objects to come, and what those before them did.
 pub(super) struct Budget {
     milliseconds: f64,
-    bytes_per_sample: u64,
+    bytes: u64,
     /// Lights with exact depths, summed over objects.
     pub exact: usize,
     /// Lights that wait for theirs.
@@ -82,9 +81,9 @@ pub(super) struct Budget {
 }
 
 impl Budget {
-    /// For so many samples of all objects.
-    pub fn new(settings: Settings, samples: usize) -> Self {
-        let bytes_per_sample = settings.memory / samples.max(1) as u64;
-        Self { milliseconds: settings.milliseconds, bytes_per_sample, exact: 0, waiting: 0, rays: 0 }
+    /// Of a frame; tables of all objects together, half of what is kept, must fit `binding` bytes.
+    pub fn new(settings: Settings, binding: u64) -> Self {
+        let bytes = settings.memory.min(binding.saturating_mul(2));
+        Self { milliseconds: settings.milliseconds, bytes, exact: 0, waiting: 0, rays: 0 }
     }
 }

@@ -39,13 +39,15 @@ impl Renderer {
             return Err(Error::Host(format!("a picture of {w} x {h} pixels does not fit the device")));
         }
         let (visible, report) = self.visible(device, host)?;
+        let HostReport { exact, waiting, .. } = self.report;
         self.report = report;
         // A depth buffer may have changed without a word.
         let frames = visible.iter().map(|v| v.frame.clone()).collect();
         let seen = host.depth.is_none().then_some(Seen { frames, exposure: host.exposure });
         let fits = self.picture.as_ref().is_some_and(|p| p.size == host.size);
         if fits && seen.is_some() && self.seen == seen && !self.is_busy() {
-            self.report = HostReport { reused: true, tiles: 0, draws: 0, samples: 0, ..self.report };
+            let still = HostReport { reused: true, tiles: 0, draws: 0, samples: 0, ..self.report };
+            self.report = HostReport { exact, waiting, ..still };
             return Ok(());
         }
         self.seen = None;
@@ -54,7 +56,7 @@ impl Renderer {
         }
         self.overlay.write(queue, host.size, host.exposure);
         let parts = self.parts(device, queue, &visible);
-        let exact = self.trace(&visible, &parts);
+        let exact = self.trace(device, &visible, &parts);
         let jobs = self.begin(device, queue, &visible, &parts, &exact, host.size)?;
         self.report.draws = jobs.len();
         let (Some(picture), Some((targets, _))) = (&self.picture, &self.targets) else { return Ok(()) };

@@ -40,11 +40,13 @@ impl Pools {
         material: Option<&Info>,
     ) -> Berth {
         let owner = material.map(|_| object);
-        let found = self.0.iter_mut().enumerate().find_map(|(k, pool)| {
-            let pool = pool.as_mut().filter(|p| p.owner == owner)?;
-            Some(Berth { pool: k, slot: pool.slot(device, object)? })
-        });
-        found.unwrap_or_else(|| {
+        let mut open: Vec<(usize, &mut Pool)> = self.0.iter_mut().zip(0..).filter_map(own(owner)).collect();
+        let known = open.iter().find_map(|(pool, p)| Some(Berth { pool: *pool, slot: p.slot_of(object)? }));
+        let mut free = || {
+            let mut pools = open.iter_mut();
+            pools.find_map(|(pool, p)| Some(Berth { pool: *pool, slot: p.take_slot(device, object)? }))
+        };
+        known.or_else(&mut free).unwrap_or_else(|| {
             let mut pipeline = level.instance(device);
             if let Some(info) = material {
                 pipeline.set_own_material(device, queue, info);
@@ -84,12 +86,22 @@ impl Pools {
     }
 }
 
+/// Picks the pools of an owner, with their places.
+fn own<'a>(
+    owner: Option<usize>,
+) -> impl FnMut((&'a mut Option<Pool>, usize)) -> Option<(usize, &'a mut Pool)> {
+    move |(pool, place)| Some((place, pool.as_mut().filter(|p| p.owner == owner)?))
+}
+
 impl Pool {
-    /// The slot of an object that is in it, or one that it takes now, if there is one.
-    fn slot(&mut self, device: &Device, object: usize) -> Option<usize> {
-        let known = self.taken.iter().position(|t| *t == Some(object));
-        let free = || self.taken.iter().position(Option::is_none);
-        if let Some(slot) = known.or_else(free) {
+    /// The slot of an object that is in it.
+    fn slot_of(&self, object: usize) -> Option<usize> {
+        self.taken.iter().position(|t| *t == Some(object))
+    }
+
+    /// A slot for another object, if there is room.
+    fn take_slot(&mut self, device: &Device, object: usize) -> Option<usize> {
+        if let Some(slot) = self.taken.iter().position(Option::is_none) {
             self.taken[slot] = Some(object);
             return Some(slot);
         }

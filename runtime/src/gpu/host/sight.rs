@@ -6,6 +6,7 @@ use crate::Result;
 use crate::detail::{Choice, pixels_at_nearest};
 use crate::exact::ExactDepths;
 use crate::frame::Frame;
+use crate::gpu::frame::most_bound;
 use crate::gpu::targets::{TOTAL, budget};
 use crate::gpu::tiles::{Tile, split};
 use crate::placement::covered;
@@ -109,21 +110,23 @@ impl Renderer {
     }
 
     /// Traces for as long as the frame may take, for the nearest objects first; what serves the lights of each part now.
-    pub(super) fn trace(&mut self, visible: &[Visible], parts: &[Part]) -> Vec<Option<ExactDepths>> {
+    pub(super) fn trace(
+        &mut self,
+        device: &Device,
+        visible: &[Visible],
+        parts: &[Part],
+    ) -> Vec<Option<ExactDepths>> {
         let Some(settings) = self.exact else { return parts.iter().map(|_| None).collect() };
-        let mut samples = 0;
-        for (v, seen) in visible.iter().enumerate() {
-            let Some(Some(Instance { asset, info, spreads, .. })) = self.instances.get_mut(seen.instance)
-            else {
-                continue;
-            };
-            let levels = parts.iter().filter(|p| p.visible == v).map(|p| p.pool.level);
+        for (k, instance) in self.instances.iter_mut().enumerate() {
+            let Some(Instance { asset, info, spreads, .. }) = instance else { continue };
+            // Those out of sight keep nothing, and nobody waits for them.
+            let mine = parts.iter().filter(|p| visible[p.visible].instance == k);
+            let levels: Vec<usize> = mine.map(|p| p.pool.level).collect();
             if let Some(Some(Levels { tracers: Some(tracers), .. })) = self.assets.get(*asset) {
-                spreads.follow(&levels.collect::<Vec<_>>(), tracers, info, settings);
-                samples += spreads.samples();
+                spreads.follow(&levels, tracers, info, settings);
             }
         }
-        let mut budget = Budget::new(settings, samples);
+        let mut budget = Budget::new(settings, most_bound(device));
         let mut exact = Vec::with_capacity(parts.len());
         for part in parts {
             let seen = &visible[part.visible];

@@ -29,6 +29,7 @@ impl Pipeline {
         if self.frame.reserve(device, self.asset.slots, lights)? {
             self.lit.fill(None);
         }
+        self.frame.keep_tables(objects);
         let mut stale = Vec::new();
         self.pending.clear();
         for object in objects {

@@ -278,6 +278,9 @@ fn sheets() -> Vec<Kind> {
         kind("a sheet beside a ball", Ball, count, |t| {
             joined(&[t, moved(sheet(0.6, 6, |_, _| 0.0), DVec3::new(0.0, -1.1, 0.0))])
         }),
+        kind("a ball with holes over a sheet of more faces", Ball, count, |t| {
+            joined(&[pierced(t, 0.01), moved(sheet(0.6, 60, |_, _| 0.0), DVec3::new(0.0, -1.1, 0.0))])
+        }),
         kind("a wavy sheet inside a ball", Ball, count, |t| joined(&[t, scaled(sheet(1.0, 12, wave), 0.5)])),
         kind(
             "a Möbius band beside a torus",

@@ -144,7 +144,7 @@ impl App {
         let view = View::new(window, &self.session.asset, self.budget)
             .map_err(|e| anyhow!("{failure}; opened again: {e:#}"))?;
         self.message = format!("the GPU was opened again: {failure}");
-        eprintln!("note: {}", self.message);
+        crate::tell(&format!("note: {}", self.message));
         view.screen.window.request_redraw();
         self.view = Some(View { place, pointer, frames, ..view });
         Ok(())
@@ -157,7 +157,7 @@ impl App {
             return;
         }
         if let Some(message) = self.sources.look(&mut self.session, self.view.as_mut(), self.budget) {
-            eprintln!("note: {message}");
+            crate::tell(&format!("note: {message}"));
             self.message = message;
             if let Some(view) = &self.view {
                 view.screen.window.request_redraw();

@@ -11,6 +11,7 @@ use diaphane_formats::picture::{Display, Picture, write_png_bytes};
 use diaphane_runtime::exact::ExactDepths;
 use diaphane_runtime::frame::{Frame, View};
 use diaphane_runtime::gpu::Request;
+use diaphane_runtime::player::LightMode;
 use glam::DVec3;
 use std::time::{Duration, Instant};
 use winit::event_loop::ActiveEventLoop;
@@ -28,27 +29,32 @@ impl App {
         let Some(view) = &mut self.view else { return Ok(()) };
         let context = view.input.egui_ctx().clone();
         view.input.handle_platform_output(&view.screen.window, output.platform_output);
-        let moving = self.errand.is_none() && view.changed.elapsed() < SETTLING;
         let whole = self.session.frame(view.place, 1)?;
-        let chosen = view.levels.choose(moving, &whole, &self.session.asset.info);
+        let (mode, edit) = (self.session.mode, self.session.edit);
+        // A finer or coarser picture of the same is no change; rounding its size moves the right edge a little.
+        let stays = view.shown.as_ref().is_some_and(|s| {
+            let (width, height) = (s.frame.width, s.frame.height);
+            let seen = View { right: s.frame.view.right, ..whole.view };
+            s.mode == mode
+                && s.edit == edit
+                && Frame { width, height, view: seen, ..whole.clone() } == s.frame
+        });
+        if !stays {
+            view.changed = Instant::now();
+        }
+        let moving = self.errand.is_none() && view.changed.elapsed() < SETTLING;
+        // Lights inside have no use of coarser levels, which play baked depths.
+        let whole_only =
+            mode != LightMode::Baked && !whole.lights_inside(&self.session.asset.info).is_empty();
+        let chosen = view.levels.choose(moving, whole_only, &whole, &self.session.asset.info);
         let Chosen { level, divisor } = chosen;
         let frame = if divisor == 1 { whole } else { self.session.frame(view.place, divisor)? };
-        let (mode, edit) = (self.session.mode, self.session.edit);
         let same = view
             .shown
             .as_ref()
             .is_some_and(|s| s.frame == frame && s.mode == mode && s.edit == edit && s.level == level);
         let switched = view.screen.level() != level;
         if !same {
-            // A finer or coarser picture of the same is no change; rounding its size moves the right edge a little.
-            let stays = view.shown.as_ref().is_some_and(|s| {
-                let (width, height) = (s.frame.width, s.frame.height);
-                let view = View { right: s.frame.view.right, ..frame.view };
-                s.mode == mode && s.edit == edit && Frame { width, height, view, ..frame.clone() } == s.frame
-            });
-            if !stays {
-                view.changed = Instant::now();
-            }
             if switched {
                 view.screen.set_level(&self.session.asset, level)?;
             }
@@ -58,7 +64,7 @@ impl App {
         }
         let exact = self.session.advance(&frame, view.frame_ms);
         // Light that goes from baked to exact depths is drawn anew, but nothing moves.
-        if !same || view.shown.as_ref().is_some_and(|s| s.exact != exact) {
+        if !same || (level == 0 && view.shown.as_ref().is_some_and(|s| s.exact != exact)) {
             view.shown = Some(Shown { frame, mode, edit, exact, level, rays: 0 });
         }
         let Some(shown) = &mut view.shown else {
@@ -101,13 +107,15 @@ impl App {
         if let Some(action) = action {
             self.act(action)?;
         }
-        self.plan(painted.again, output.viewport_output.values().map(|v| v.repaint_delay).min());
+        let panel_delay = output.viewport_output.values().map(|v| v.repaint_delay).min();
+        self.plan(painted.again, panel_delay, moving);
         Ok(())
     }
 
     /// When the next frame is due: at once while there is something to refine, else when the panel or the picture's
-    /// settling asks for it. Where the window took no picture, after `again`.
-    fn plan(&mut self, again: Option<Duration>, panel_delay: Option<Duration>) {
+    /// settling asks for it. Where the window took no picture, after `again`. What was drawn as `moving` is drawn once more as soon as it
+    /// has settled.
+    fn plan(&mut self, again: Option<Duration>, panel_delay: Option<Duration>, moving: bool) {
         let Some(view) = &self.view else { return };
         let wanted = if view.screen.renderer.tiles() > 1 { 1 } else { RAYS };
         let settled = view.changed.elapsed() >= SETTLING;
@@ -119,6 +127,7 @@ impl App {
         } else if self.errand.is_some()
             || again.is_some()
             || unfinished
+            || (moving && settled)
             || delay.is_zero()
             || self.session.is_busy()
         {

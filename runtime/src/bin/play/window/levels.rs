@@ -46,10 +46,10 @@ impl Levels {
         self.governor.is_some()
     }
 
-    /// What to draw the next frame with; `whole` is that frame with a pixel for every one of the window.
-    pub fn choose(&mut self, moving: bool, whole: &Frame, info: &Info) -> Chosen {
+    /// What to draw the next frame with, all samples if it must be; `whole` is that frame with a pixel for every one of the window.
+    pub fn choose(&mut self, moving: bool, whole_only: bool, whole: &Frame, info: &Info) -> Chosen {
         let level = match &mut self.governor {
-            Some(governor) if moving => {
+            Some(governor) if moving && !whole_only => {
                 let pixels = pixels_at_nearest(whole, info);
                 governor.set_coarsest(ALL.coarsest(&self.details, pixels, self.varies));
                 governor.fineness().choose(&self.details, pixels, self.varies).level
@@ -111,11 +111,11 @@ mod tests {
     /// Draws frames that take so long a sample in all pixels, in proportion to those; what came of it.
     fn draw(levels: &mut Levels, (asset, frame): &(Asset, Frame), frames: usize, per_sample: f64) -> Chosen {
         for _ in 0..frames {
-            let chosen = levels.choose(true, frame, &asset.info);
+            let chosen = levels.choose(true, false, frame, &asset.info);
             let pixels = 0.25f64.powi(chosen.divisor.ilog2() as i32);
             levels.learn(chosen, true, 1.0 + per_sample * levels.sizes[chosen.level].0 as f64 * pixels);
         }
-        levels.choose(true, frame, &asset.info)
+        levels.choose(true, false, frame, &asset.info)
     }
 
     #[test]
@@ -140,7 +140,7 @@ mod tests {
         let slow = draw(&mut levels, &shown, 300, 3000.0 / all);
         assert!(slow.level == 2 && slow.divisor > 1, "{slow:?}");
         // At rest, and as soon as there is time again.
-        assert_eq!(levels.choose(false, &shown.1, &shown.0.info).level, 0);
+        assert_eq!(levels.choose(false, false, &shown.1, &shown.0.info).level, 0);
         assert_eq!(draw(&mut levels, &shown, 600, 10.0 / all), Chosen { level: 0, divisor: 1 });
     }
 

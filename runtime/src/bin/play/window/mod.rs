@@ -57,7 +57,7 @@ pub fn run(args: &Args) -> Result<()> {
     let edit = args.edit();
     let session = Session::new(asset, scene, mode, edit)?;
     if let Some(warning) = edit.warning() {
-        eprintln!("warning: {warning}");
+        crate::tell(&format!("warning: {warning}"));
     }
     let event_loop = EventLoop::new().map_err(|e| {
         // The reason follows the place in winit's source that noticed it.
