@@ -181,6 +181,12 @@ impl PictureRenderer {
         Ok(())
     }
 
+    /// Forgets the picture and what it took to draw it, until the next one.
+    pub fn rest(&mut self) {
+        self.picture = None;
+        self.passes.forget_targets();
+    }
+
     /// Changes the exposure of the picture that is there.
     pub fn expose(&self, queue: &Queue, exposure: f32) {
         self.display.write(queue, exposure);

@@ -135,7 +135,9 @@ impl Screen {
             }
         };
         self.gpu.check()?;
-        let last = std::mem::replace(&mut self.renderer, next);
+        let mut last = std::mem::replace(&mut self.renderer, next);
+        // Others need the memory of its pixels.
+        last.rest();
         self.parked.push((std::mem::replace(&mut self.level, level), last));
         Ok(())
     }
