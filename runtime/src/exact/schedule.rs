@@ -6,12 +6,15 @@
 //! longest. Each light's share of [`super`] rises by 1 / [`Settings::fade_frames`] a frame while its depths hold, and falls as
 //! fast when they do not.
 
+mod kept;
+
 use super::pace::Pace;
 use super::report::{ExactReport, LightError, Squares};
 use super::{Corrections, Depths, ExactDepths, Known};
 use crate::frame::{FrameLight, LightKind};
 use glam::Vec3;
 use half::f16;
+use kept::{Entry, Kept};
 use std::collections::HashMap;
 use std::ops::Range;
 use std::sync::Arc;
@@ -89,17 +92,6 @@ pub trait Work {
     ) -> (Vec<[f16; 4]>, Squares);
 }
 
-/// Complete depths of a light.
-struct Entry {
-    light: FrameLight,
-    place: Place,
-    depths: Arc<Depths>,
-    corrections: Arc<Corrections>,
-    error: f32,
-    /// Number of the material that the corrections are for.
-    material: u64,
-}
-
 /// What is known of a light of the last frame.
 struct Track {
     place: Place,
@@ -125,13 +117,11 @@ const ENOUGH: f64 = 0.75;
 pub struct Schedule {
     settings: Settings,
     tracks: Vec<Track>,
-    /// With the frame in which each was of use last.
-    kept: HashMap<Place, (Arc<Entry>, u64)>,
+    kept: Kept,
     job: Option<Job>,
     pace: Pace,
     frame: u64,
     material: u64,
-    evicted: u64,
     report: ExactReport,
     busy: bool,
 }
@@ -143,12 +133,11 @@ impl Schedule {
         Self {
             settings,
             tracks: Vec::new(),
-            kept: HashMap::new(),
+            kept: Kept::new(settings.memory),
             job: None,
             pace: Pace::default(),
             frame: 0,
             material: 0,
-            evicted: 0,
             report: ExactReport::default(),
             busy: false,
         }
@@ -166,18 +155,12 @@ impl Schedule {
 
     /// Sets the bytes that complete depths may take from now on; what is more goes, that which was of no use for longest first.
     pub fn set_memory(&mut self, bytes: u64) {
-        self.settings.memory = bytes;
-        while self.kept_bytes() > bytes {
-            let oldest = self.kept.iter().min_by_key(|(place, (_, used))| (*used, place.at));
-            let Some(place) = oldest.map(|(place, _)| *place) else { break };
-            self.kept.remove(&place);
-            self.evicted += 1;
-        }
+        self.kept.set_memory(bytes);
     }
 
     /// Bytes of the depths that are kept.
     pub fn kept_bytes(&self) -> u64 {
-        self.kept.values().map(|(entry, _)| bytes(entry.depths.values().len())).sum()
+        self.kept.bytes()
     }
 
     /// Whether the next frames will differ from this one although nothing moves.
@@ -220,7 +203,7 @@ impl Schedule {
 
     /// Whether a light that is baked now will fade in the next frame.
     fn may_rise(&self, track: &Track, wish: Wish) -> bool {
-        track.steps == 0 && wish != Wish::Baked && self.kept.contains_key(&track.place)
+        track.steps == 0 && wish != Wish::Baked && self.kept.contains(&track.place)
     }
 
     fn known(&self, track: &Track) -> Option<Known> {
@@ -292,9 +275,7 @@ impl Schedule {
 
     /// Depths that are kept for a place; they count as used.
     fn find(&mut self, place: Place) -> Option<Arc<Entry>> {
-        let (entry, used) = self.kept.get_mut(&place)?;
-        *used = self.frame;
-        Some(Arc::clone(entry))
+        self.kept.find(place, self.frame)
     }
 
     /// All depths of a light, in this frame. They are not kept for others: such lights may move in every frame.
@@ -321,9 +302,7 @@ impl Schedule {
             error: squares.relative(),
             material: self.material,
         });
-        if let Some((kept, _)) = self.kept.get_mut(&entry.place) {
-            *kept = Arc::clone(&renewed);
-        }
+        self.kept.renew(&renewed);
         renewed
     }
 
@@ -339,7 +318,7 @@ impl Schedule {
         while spent < ENOUGH * self.settings.milliseconds {
             if self.job.is_none() {
                 let Some(&next) = queue.first() else { break };
-                if !self.make_room(samples) {
+                if !self.kept.make_room(samples, self.frame) {
                     break;
                 }
                 let (light, place) = (lights[next], self.tracks[next].place);
@@ -360,7 +339,7 @@ impl Schedule {
             {
                 queue.retain(|i| self.tracks[*i].place != job.place);
                 let entry = Arc::new(complete(&job.light, job.done, job.material));
-                self.kept.insert(job.place, (entry, self.frame));
+                self.kept.insert(entry, self.frame);
             } else if count == 0 {
                 break;
             }
@@ -376,37 +355,16 @@ impl Schedule {
             Wish::AtRest(most) if self.tracks[i].rest >= self.settings.rest_frames => Some((false, most)),
             _ => None,
         };
-        let waits = |i: &usize| !self.kept.contains_key(&self.tracks[*i].place);
+        let waits = |i: &usize| !self.kept.contains(&self.tracks[*i].place);
         let ranked = (0..lights.len()).filter(waits).filter_map(|i| Some((rank(i)?, i)));
         let mut queue: Vec<((bool, f64), usize)> = ranked.collect();
         queue.sort_by(|((a, x), i), ((b, y), j)| b.cmp(a).then(y.total_cmp(x)).then(i.cmp(j)));
         queue.into_iter().map(|(_, i)| i).collect()
     }
 
-    /// Depths that may go, those first that were of no use for longest.
-    fn oldest(&self) -> Option<Place> {
-        let unused = self.kept.iter().filter(|(_, (_, used))| *used < self.frame);
-        unused.min_by_key(|(place, (_, used))| (*used, place.at)).map(|(place, _)| *place)
-    }
-
-    /// Whether the depths of one more light fit beside all others.
-    fn fits(&self, samples: usize) -> bool {
-        (self.kept.len() as u64 + 1) * bytes(samples) <= self.settings.memory
-    }
-
-    /// Sees that the depths of one more light fit; false where all that is kept is in use, or one is too many.
-    fn make_room(&mut self, samples: usize) -> bool {
-        while !self.fits(samples) {
-            let Some(oldest) = self.oldest() else { return false };
-            self.kept.remove(&oldest);
-            self.evicted += 1;
-        }
-        true
-    }
-
     fn count(&mut self, waiting: usize, samples: usize) {
         let fade = self.settings.fade_frames;
-        let room = self.job.is_some() || self.fits(samples) || self.oldest().is_some();
+        let room = self.job.is_some() || self.kept.may_fit(samples, self.frame);
         let report = &mut self.report;
         (report.waiting, report.crowded) = match (waiting, room) {
             (0, _) => (0, 0),
@@ -425,8 +383,8 @@ impl Schedule {
         }
         report.baked = self.tracks.len().saturating_sub(report.exact + report.fading + waiting);
         report.rays_per_second = self.pace.per_second();
-        report.bytes = self.kept.len() as u64 * bytes(samples);
-        report.evicted = self.evicted;
+        report.bytes = self.kept.bytes();
+        report.evicted = self.kept.evicted;
     }
 }
 
@@ -439,11 +397,6 @@ fn complete(light: &FrameLight, portion: Portion, material: u64) -> Entry {
         corrections: Arc::new(Corrections::new(portion.corrections)),
         material,
     }
-}
-
-/// Of one light's depths and corrections.
-fn bytes(samples: usize) -> u64 {
-    (samples * (size_of::<[f32; 2]>() + size_of::<[f16; 4]>())) as u64
 }
 
 #[cfg(test)]

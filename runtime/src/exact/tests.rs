@@ -148,7 +148,7 @@ fn work_for_a_light_that_moves_is_dropped() {
     }
     let first = &work.runs[0];
     assert_eq!((first.0.position.x, first.1.start), (1.0, 0));
-    assert_eq!(schedule.kept.len(), 1);
+    assert_eq!(schedule.kept.bytes(), 16 * 1000);
 }
 
 #[test]
@@ -174,7 +174,7 @@ fn memory_is_bounded_and_the_least_recently_used_go_first() {
         assert!(schedule.report().bytes <= SETTINGS.memory);
     }
     assert_eq!(schedule.report().evicted, 1);
-    let kept = |x: f32| schedule.kept.contains_key(&place(&light(x)));
+    let kept = |x: f32| schedule.kept.contains(&place(&light(x)));
     assert_eq!([0.0, 1.0, 2.0].map(kept), [false, true, true]);
     // More lights than there is memory for: two are exact, and the schedule rests.
     let lights = [3.0, 4.0, 5.0, 6.0].map(light);
@@ -183,6 +183,15 @@ fn memory_is_bounded_and_the_least_recently_used_go_first() {
     let report = schedule.report();
     assert_eq!((report.exact, report.crowded, report.baked), (2, 2, 0));
     assert_eq!(shares(&mut schedule, &lights, REST, 1), [[1.0, 1.0, 0.0, 0.0]]);
+    // Less of it takes depths away that are in use: their lights fade back.
+    schedule.set_memory(16 * 1000);
+    let fading = shares(&mut schedule, &lights, REST, 1);
+    assert!(
+        schedule.report().bytes == 16 * 1000 && fading[0].iter().any(|s| *s > 0.0 && *s < 1.0),
+        "{fading:?}"
+    );
+    settle(&mut schedule, &lights, REST);
+    assert_eq!((schedule.report().exact, schedule.report().crowded), (1, 3));
     // Not even one fits.
     let mut none = Schedule::new(Settings { memory: 10, ..SETTINGS });
     settle(&mut none, &lights, REST);
