@@ -54,7 +54,8 @@ pub(super) fn join(positions: &[DVec3], triangles: &mut [[u32; 3]], pieces: &mut
             pieces.turned[t as usize] ^= true;
         }
     }
-    for set in sets.iter().filter(|set| set.len() > 1) {
+    for set in sets.iter_mut().filter(|set| set.len() > 1) {
+        leave_sheets(positions, triangles, pieces, set);
         let all: Vec<u32> = set.iter().flat_map(|p| &pieces.members[*p]).copied().collect();
         let faces: Vec<[u32; 3]> = all.iter().map(|t| triangles[*t as usize]).collect();
         if is_torn(positions, &faces, if trusted { LOOP } else { LOOP_GUESSED }) {
@@ -73,6 +74,23 @@ pub(super) fn join(positions: &[DVec3], triangles: &mut [[u32; 3]], pieces: &mut
         pieces.members[set[0]] = all;
     }
     pieces.drop_empty();
+}
+
+/// Leaves sheets out that hang at a vertex: what is left wraps around itself more without them. Bits may be anything.
+fn leave_sheets(positions: &[DVec3], triangles: &[[u32; 3]], pieces: &Pieces, set: &mut Vec<usize>) {
+    let closed = |set: &[usize]| {
+        let all = set.iter().flat_map(|p| &pieces.members[*p]);
+        let corners: Vec<[DVec3; 3]> =
+            all.map(|t| triangles[*t as usize].map(|v| positions[v as usize])).collect();
+        sheets::around_itself(&corners).abs()
+    };
+    let large: Vec<usize> = set.iter().copied().filter(|p| pieces.members[*p].len() >= FEW).collect();
+    for p in large {
+        let rest: Vec<usize> = set.iter().copied().filter(|q| *q != p).collect();
+        if closed(&rest) > closed(set) && closed(&[p]) < sheets::WRAPS {
+            *set = rest;
+        }
+    }
 }
 
 /// Whether nearly every face stands alone and holes are long.

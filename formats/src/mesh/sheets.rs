@@ -15,7 +15,7 @@ use std::f64::consts::PI;
 
 /// Mean winding number around its own surface below which a piece wraps around nothing. A hemisphere has 1/π, a
 /// round dish an eighth as deep as it is wide 0.105.
-const WRAPS: f64 = 0.1;
+pub(super) const WRAPS: f64 = 0.1;
 
 /// The others wrap around half of a needed piece: their winding number on both its sides is 1/2, give or take this.
 const NEEDED: f64 = 0.25;
@@ -49,7 +49,7 @@ fn means_beside(faces: &[Corners], winding: impl Fn(DVec3) -> f64 + Sync) -> [f6
 }
 
 /// Mean winding number of a piece around its own surface, a face itself left out.
-fn around_itself(faces: &[Corners]) -> f64 {
+pub(super) fn around_itself(faces: &[Corners]) -> f64 {
     let tree = Winding::new(faces.to_vec());
     0.5 * means_beside(faces, |q| tree.at(q)).iter().sum::<f64>()
 }

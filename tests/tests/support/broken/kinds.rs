@@ -281,6 +281,12 @@ fn sheets() -> Vec<Kind> {
         kind("a ball with holes over a sheet of more faces", Ball, count, |t| {
             joined(&[pierced(t, 0.01), moved(sheet(0.6, 60, |_, _| 0.0), DVec3::new(0.0, -1.1, 0.0))])
         }),
+        kind("a leaf at a vertex of a ball with holes", Ball, count, |t| {
+            let bump = |x: f64, z: f64| 0.8 * (0.25 - x * x) * (1.0 - 4.0 * z * z);
+            let leaf = sheet(1.0, 12, bump);
+            let (stalk, tip) = (t.positions[0], leaf.positions[leaf.positions.len() - 1]);
+            joined(&[pierced(t, 0.01), moved(leaf, stalk - tip)])
+        }),
         kind("a wavy sheet inside a ball", Ball, count, |t| joined(&[t, scaled(sheet(1.0, 12, wave), 0.5)])),
         kind(
             "a Möbius band beside a torus",
