@@ -24,6 +24,10 @@ const LONE: f64 = 0.6;
 const LOOP: f64 = 20.0;
 const LOOP_GUESSED: f64 = 8.0;
 
+/// Share above which a piece is no sheet: of 72 faces, a square one has 0.22. Where a share s of the faces is missing it is
+/// 2 s / (1 + s).
+const RAGGED: f64 = 0.25;
+
 /// Fewer faces are never torn: shares of so few mean nothing.
 pub(super) const FEW: usize = 64;
 
@@ -93,14 +97,24 @@ fn leave_sheets(positions: &[DVec3], triangles: &[[u32; 3]], pieces: &Pieces, se
     }
 }
 
-/// Whether nearly every face stands alone and holes are long.
-fn is_torn(positions: &[DVec3], faces: &[[u32; 3]], longest: f64) -> bool {
-    let missing = close::missing(faces);
+/// Share of the edges that belong to a single face.
+fn lone_share(faces: &[[u32; 3]]) -> f64 {
     let all: HashSet<(u32, u32)> =
         faces.iter().flat_map(|t| edges(*t)).map(|(a, b)| (a.min(b), a.max(b))).collect();
-    if faces.len() < FEW || missing.len() as f64 <= LONE * all.len() as f64 {
+    close::missing(faces).len() as f64 / all.len().max(1) as f64
+}
+
+/// Whether a piece is no sheet but what is left of something.
+pub(super) fn is_ragged(faces: &[[u32; 3]]) -> bool {
+    faces.len() < FEW || lone_share(faces) > RAGGED
+}
+
+/// Whether nearly every face stands alone and holes are long.
+fn is_torn(positions: &[DVec3], faces: &[[u32; 3]], longest: f64) -> bool {
+    if faces.len() < FEW || lone_share(faces) <= LONE {
         return false;
     }
+    let missing = close::missing(faces);
     let rings = loops::trace(positions, faces, &missing);
     let squares: f64 = rings.iter().map(|ring| (ring.len() as f64).powi(2)).sum();
     squares > longest * missing.len() as f64

@@ -81,8 +81,7 @@ fn retain(triangles: &mut Vec<[u32; 3]>, keep: impl Fn(usize) -> bool) {
     });
 }
 
-/// Pieces without open sheets, which triangles were turned, and how many faces of tatters went with the sheets: of torn ones and of
-/// few faces. Where a sheet goes, what it hung on may hang together.
+/// Pieces without open sheets, which triangles were turned, and how many faces of tatters went with the sheets. Where a sheet goes, what it hung on may hang together.
 fn oriented(
     positions: &[DVec3],
     triangles: &mut Vec<[u32; 3]>,
@@ -103,9 +102,9 @@ fn oriented(
         if !gone.contains(&true) {
             return (turned, pieces, tatters);
         }
-        let own = pieces.members.iter().zip(&pieces.torn);
-        let small = own.filter(|(m, torn)| **torn || m.len() < islands::FEW).map(|(m, _)| m);
-        tatters += small.flatten().filter(|t| gone[**t as usize]).count();
+        let went = pieces.members.iter().filter(|m| m.first().is_some_and(|t| gone[*t as usize]));
+        let faces = went.map(|m| m.iter().map(|t| triangles[*t as usize]).collect::<Vec<_>>());
+        tatters += faces.filter(|f| islands::is_ragged(f)).map(|f| f.len()).sum::<usize>();
         retain(triangles, |i| !gone[i]);
         let mut gone = gone.iter();
         turned.retain(|_| gone.next() == Some(&false));
