@@ -29,14 +29,14 @@ pub(super) fn repair(positions: Vec<DVec3>, triangles: Vec<[u32; 3]>) -> Result<
     let (mut turned, pieces, tatters) = oriented(&positions, &mut triangles, &mut report);
     let shells = shells::gather(&mut positions, &triangles, &pieces, &mut report);
     let fates = shells::nest(&shells, &mut report);
-    // Of what is torn, bits may have an inside by chance: open shells that are less than the tatters beside them are no object.
+    // Of what is torn, bits may have an inside by chance, and one part may be turned against another.
     let (flat, solid): (Vec<_>, Vec<_>) =
         shells.iter().zip(&fates).partition(|(_, fate)| **fate == Fate::Flat);
     let count = |some: &[(&shells::Shell, &Fate)]| some.iter().map(|(s, _)| s.members.len()).sum::<usize>();
     let are_open = solid.iter().all(|(shell, _)| !shell.patches.is_empty());
-    if are_open && faces >= islands::FEW && count(&solid) < count(&flat) + tatters {
-        report.mending.sheets += shells.len();
-        return Err(no_inside(&report));
+    let (left, lost) = (count(&solid), count(&flat) + tatters);
+    if are_open && left > 0 && lost * if faces < islands::FEW { 1 } else { LOST } > left {
+        return Err(torn(lost, faces));
     }
     // Members in their old order, patches after them.
     let mut kept = vec![false; triangles.len()];
@@ -112,6 +112,16 @@ fn oriented(
         islands::join(positions, triangles, &mut pieces);
         turned.iter_mut().zip(&pieces.turned).for_each(|(all, now)| *all ^= now);
     }
+}
+
+/// Open shells are taken for torn where there is more than one such part of their faces beside them that belongs to nothing.
+const LOST: usize = 16;
+
+/// What is said of a mesh of which too much belongs to nothing.
+fn torn(lost: usize, faces: usize) -> Error {
+    Error::invalid(format!(
+        "is torn: {lost} of {faces} faces belong to nothing that encloses a volume, and what does has holes; close the holes or remove the loose faces"
+    ))
 }
 
 /// Why nothing is left.
