@@ -1,8 +1,7 @@
 //! Buffers that stay as long as an asset does.
 
-use super::bindings::{empty_buffer, filled_buffer};
+use super::bindings::{empty_buffer, filled_buffer, most_bound};
 use super::faults::allocate;
-use super::frame::most_bound;
 use super::mesh::{self, MeshPart};
 use super::packed;
 use super::shard::{SOURCE, Shard, Source, ranges};

@@ -144,3 +144,9 @@ pub(super) fn filled_buffer<T: bytemuck::Pod>(
     }
     buffer
 }
+
+/// Most bytes of a buffer that a shader sees.
+pub(super) fn most_bound(device: &Device) -> u64 {
+    let limits = device.limits();
+    limits.max_storage_buffer_binding_size.min(limits.max_buffer_size)
+}

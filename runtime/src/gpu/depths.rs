@@ -1,8 +1,10 @@
 //! Exact optical depths on the GPU: a ray for every sample, to one light.
 
-use super::bindings::{Slot, compute, empty_buffer, filled_buffer, group, layout, pipeline_layout};
+use super::bindings::{
+    Slot, compute, empty_buffer, filled_buffer, group, layout, most_bound, pipeline_layout,
+};
 use super::device::GpuDevice;
-use super::frame::{common_layout, most_bound};
+use super::frame::common_layout;
 use super::hierarchy::{Hierarchy, Node};
 use super::lot::MOST_VIEWS;
 use super::readback;

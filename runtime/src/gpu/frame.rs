@@ -1,7 +1,7 @@
 //! Buffers that follow the frame: rays and lights of one or several objects with the same samples.
 
 use super::asset::AssetBuffers;
-use super::bindings::{Slot, empty_buffer, group, layout};
+use super::bindings::{Slot, empty_buffer, group, layout, most_bound};
 use super::lot::MOST_VIEWS;
 use super::uniforms::{LightLayout, LightRecord, TableUse, ViewUniform};
 use crate::cpu::lighting::Lighting;
@@ -383,12 +383,6 @@ fn sent(frame: &Frame, plan: &Plan, linear: &Linear, mean_cosine: f32) -> Vec<[f
 /// Bytes of so many views: a binding begins at each of them.
 fn views_size(views: usize) -> u64 {
     VIEW_STRIDE * (views + MOST_VIEWS - 1) as u64
-}
-
-/// Most bytes of a buffer that a shader sees.
-pub(super) fn most_bound(device: &Device) -> u64 {
-    let limits = device.limits();
-    limits.max_storage_buffer_binding_size.min(limits.max_buffer_size)
 }
 
 /// Replaces a storage buffer that is too small; says whether it did.

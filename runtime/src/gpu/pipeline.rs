@@ -6,7 +6,8 @@ mod room;
 pub(super) use objects::Drawn;
 
 use super::asset::AssetBuffers;
-use super::frame::{FrameBuffers, Lit, Object, VIEW_STRIDE, common_layout, most_bound};
+use super::bindings::most_bound;
+use super::frame::{FrameBuffers, Lit, Object, VIEW_STRIDE, common_layout};
 use super::lot::Lot;
 use super::passes::Recorder;
 use super::passes::batches::Batches;

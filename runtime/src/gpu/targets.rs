@@ -1,6 +1,6 @@
 //! State of the pixels of tiles that are drawn together.
 
-use super::bindings::empty_buffer;
+use super::bindings::{empty_buffer, most_bound};
 use super::faults::allocate;
 use super::lot::Lot;
 use super::splatting::SplatPath;
@@ -105,7 +105,7 @@ pub(super) fn budget(device: &Device, state: PixelState, total: u64) -> Budget {
     let kept = if state.kept { KEPT } else { 0 };
     Budget {
         side: limits.max_texture_dimension_2d,
-        binding: limits.max_storage_buffer_binding_size.min(limits.max_buffer_size),
+        binding: most_bound(device),
         total,
         pixel_binding: profile.max(pieces),
         // Three vectors of state, two textures, the marker, and what is read back.

@@ -304,12 +304,18 @@ fn nothing_is_done_twice_and_nothing_out_of_sight() {
     tell(&host.renderer.place(id, Placement::IDENTITY).unwrap_err().to_string());
 }
 
+/// The coarser level has a quarter of the samples.
+fn ball_of_two_levels() -> Asset {
+    let mut asset = ball().build();
+    let weight = vec![1.0; asset.samples.len() / 4];
+    asset.levels.push(Level { width_factor: 1.6 * asset.info.width_factor, weight, error: None });
+    asset
+}
+
 #[test]
 fn a_level_fades_into_the_next() {
     let Some(GpuDevice { device, queue, .. }) = device() else { return };
-    let (mut asset, scene) = (ball().build(), scene(outside()));
-    let weight = vec![1.0; asset.samples.len() / 4];
-    asset.levels.push(Level { width_factor: 1.6 * asset.info.width_factor, weight, error: None });
+    let (asset, scene) = (ball_of_two_levels(), scene(outside()));
     let reach = details(&asset)[1].reach;
     let pixels = pixels_at_nearest(&Frame::new(&scene, &asset.info).unwrap(), &asset.info);
     // The coarse level reaches so many times as far as it may.
@@ -346,9 +352,7 @@ fn a_level_fades_into_the_next() {
 #[test]
 fn fineness_may_change_from_frame_to_frame() {
     let Some(GpuDevice { device, queue, .. }) = device() else { return };
-    let (mut asset, scene) = (ball().build(), scene(outside()));
-    let weight = vec![1.0; asset.samples.len() / 4];
-    asset.levels.push(Level { width_factor: 1.6 * asset.info.width_factor, weight, error: None });
+    let (asset, scene) = (ball_of_two_levels(), scene(outside()));
     let coarsest = Fineness { kernel_pixels: 1e3, ..Fineness::DEFAULT };
     let finest = Fineness { kernel_pixels: 0.0, ..Fineness::DEFAULT };
     let with = |fineness| {

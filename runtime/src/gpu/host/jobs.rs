@@ -4,7 +4,7 @@ use super::lots::{Together, arrange};
 use super::sight::{Part, PoolId, Visible};
 use super::{HostFrame, HostReport, Picture, Renderer, Seen};
 use crate::exact::ExactDepths;
-use crate::gpu::bindings::empty_buffer;
+use crate::gpu::bindings::{empty_buffer, most_bound};
 use crate::gpu::frame::Object;
 use crate::gpu::lot::Lot;
 use crate::gpu::pipeline::{Drawn, Pipeline, SplatPath};
@@ -32,9 +32,7 @@ impl Renderer {
         host: &HostFrame<'_>,
     ) -> Result<()> {
         let bytes = 16 * u64::from(host.size[0]) * u64::from(host.size[1]);
-        let limits = device.limits();
-        let most = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
-        if bytes == 0 || bytes > most {
+        if bytes == 0 || bytes > most_bound(device) {
             let [w, h] = host.size;
             return Err(Error::Host(format!("a picture of {w} x {h} pixels does not fit the device")));
         }

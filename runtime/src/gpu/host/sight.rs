@@ -6,7 +6,7 @@ use crate::Result;
 use crate::detail::{Choice, pixels_at_nearest};
 use crate::exact::ExactDepths;
 use crate::frame::Frame;
-use crate::gpu::frame::most_bound;
+use crate::gpu::bindings::most_bound;
 use crate::gpu::targets::{TOTAL, budget};
 use crate::gpu::tiles::{Tile, split};
 use crate::placement::covered;

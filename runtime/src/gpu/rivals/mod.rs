@@ -16,8 +16,8 @@ mod parts;
 mod stage;
 mod uniforms;
 
+use super::bindings::most_bound;
 use super::device::{GpuDevice, instance};
-use super::frame::most_bound;
 use super::hierarchy::Hierarchy;
 use crate::frame::Frame;
 use crate::{Error, Result};
@@ -113,9 +113,7 @@ impl Rivals {
     /// A grid that does not fit the adapter.
     pub fn set_grid(&mut self, side: u32) -> Result<usize> {
         let lattice = Lattice::new(&self.mesh, &self.accel, side.clamp(2, 256));
-        let limits = self.owned.device.limits();
-        let size = 16 * lattice.nodes();
-        if size > limits.max_storage_buffer_binding_size.min(limits.max_buffer_size) {
+        if 16 * lattice.nodes() > most_bound(&self.owned.device) {
             return Err(Error::Rival(format!("a grid of {side} nodes a side does not fit the adapter")));
         }
         let lit = lattice.listed.len();

@@ -5,7 +5,9 @@ use super::parts::Patience;
 use super::uniforms::{Part, SettingsUniform};
 use super::{Drawn, Settings};
 use crate::frame::Frame;
-use crate::gpu::bindings::{Slot, compute, empty_buffer, filled_buffer, group, layout, pipeline_layout};
+use crate::gpu::bindings::{
+    Slot, compute, empty_buffer, filled_buffer, group, layout, most_bound, pipeline_layout,
+};
 use crate::gpu::device::GpuDevice;
 use crate::gpu::frame::{VIEW_STRIDE, common_layout};
 use crate::gpu::hierarchy::{Hierarchy, Node};
@@ -142,8 +144,7 @@ impl Stage {
         let started = Instant::now();
         let device = &owned.device;
         let bytes = 16 * u64::from(frame.width) * u64::from(frame.height);
-        let limits = device.limits();
-        let most = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
+        let most = most_bound(device);
         if bytes > most || (size_of::<LightRecord>() * frame.lights.len()) as u64 > most {
             return Err(Error::Rival("picture or lights are too large for the rivals".to_owned()));
         }
