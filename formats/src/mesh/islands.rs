@@ -28,6 +28,9 @@ const LOOP_GUESSED: f64 = 8.0;
 /// 2 s / (1 + s).
 const RAGGED: f64 = 0.25;
 
+/// Sheets that are looked for at the vertices of what they hang on, at the most: each look is at all of it.
+const HANGING: usize = 16;
+
 /// Fewer faces are never torn: shares of so few mean nothing.
 pub(super) const FEW: usize = 64;
 
@@ -88,11 +91,17 @@ fn leave_sheets(positions: &[DVec3], triangles: &[[u32; 3]], pieces: &Pieces, se
             all.map(|t| triangles[*t as usize].map(|v| positions[v as usize])).collect();
         sheets::around_itself(&corners).abs()
     };
-    let large: Vec<usize> = set.iter().copied().filter(|p| pieces.members[*p].len() >= FEW).collect();
-    for p in large {
+    let large = set.iter().copied().filter(|p| pieces.members[*p].len() >= FEW);
+    let hanging: Vec<usize> = large.filter(|p| closed(&[*p]) < sheets::WRAPS).take(HANGING).collect();
+    if hanging.is_empty() {
+        return;
+    }
+    let mut whole = closed(set);
+    for p in hanging {
         let rest: Vec<usize> = set.iter().copied().filter(|q| *q != p).collect();
-        if closed(&rest) > closed(set) && closed(&[p]) < sheets::WRAPS {
-            *set = rest;
+        let without = closed(&rest);
+        if without > whole {
+            (*set, whole) = (rest, without);
         }
     }
 }
