@@ -155,7 +155,11 @@ fn a_grid_in_slabs_is_the_same_picture() {
     assert_eq!((whole.grid_slabs(), cut.grid_slabs(), cut.tiles(), cut.shards()), (1, 2, 0, 1));
     let (got, expected) = (cut.render(&frame, None).unwrap(), whole.render(&frame, None).unwrap());
     assert_eq!(cut.tiles(), 1);
-    assert!(difference(&got, &expected) == 0.0 && got.counters == expected.counters);
+    // The two programs differ by a choice of buffer; a compiler of hardware's may round each its own way.
+    let bound = if whole.adapter().contains("software") { 0.0 } else { 1e-5 };
+    let off = difference(&got, &expected);
+    println!("slabs: {off:e} of the peak");
+    assert!(off <= bound && got.counters == expected.counters, "{off:e}");
 }
 
 #[test]

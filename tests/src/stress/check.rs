@@ -5,14 +5,16 @@ use super::body::Baked;
 use super::energy::most_radiance;
 use super::plan::Cell;
 use super::stage::Stage;
-use super::twin::{Bounded, Lit, Medium, Piece, Seen, Twin};
+use super::twin::{Bounded, Piece, Seen, Twin};
 use diaphane_formats::asset::Asset;
 use diaphane_runtime::cpu::CpuRenderer;
 use diaphane_runtime::frame::Frame;
 use diaphane_runtime::gpu::GpuRenderer;
 use diaphane_runtime::rendered::RayResult;
 use glam::DVec3;
+use rayon::prelude::*;
 use serde::Serialize;
+use std::collections::BTreeSet;
 
 /// Names of the checks, in the table's order.
 pub const CHECKS: [&str; 6] = ["panic", "bake", "finite", "energy", "twin", "gpu"];
@@ -56,8 +58,8 @@ pub struct Findings {
 /// Largest number of rays of a cell that the twin evaluates, spread over the picture.
 const TWIN_RAYS: usize = 100;
 
-/// Samples times rays of a cell that the twin takes on.
-const TWIN_WORK: usize = 2_000_000;
+/// Samples times rays of a cell that the twin takes on, but for a single ray.
+const TWIN_WORK: usize = 8_000_000;
 
 /// Share of the peak that GPU and CPU may differ.
 const GPU_BOUND: f64 = 1e-4;
@@ -67,7 +69,7 @@ pub struct Subject<'a> {
     stage: Stage,
     asset: &'a Asset,
     cpu: CpuRenderer,
-    twin: Option<Twin<'a>>,
+    twin: Twin<'a>,
     gpu: Option<GpuRenderer>,
 }
 
@@ -88,8 +90,7 @@ impl<'a> Subject<'a> {
         Ok(Self {
             stage: Stage::new(&baked.mesh, asset),
             cpu: CpuRenderer::new(asset)?,
-            // Along a grid the player marches in single precision what the twin would integrate.
-            twin: asset.density.is_none().then(|| Twin::new(asset)),
+            twin: Twin::new(asset),
             gpu,
             asset,
         })
@@ -143,23 +144,24 @@ impl<'a> Subject<'a> {
         peak: f64,
         findings: &mut Findings,
     ) -> Vec<(usize, Seen)> {
-        let Some(twin) = &self.twin else {
-            findings
-                .skipped
-                .push(("twin", "the density is a grid, which the player marches in single precision"));
-            return Vec::new();
-        };
-        let work = TWIN_WORK / self.asset.samples.len().max(1);
-        if work == 0 || (self.asset.samples.len() > 100_000) {
-            findings.skipped.push(("twin", "too many samples for a plain sum"));
-            return Vec::new();
-        }
-        let lit = twin.lit(frame);
+        let work = (TWIN_WORK / self.asset.samples.len().max(1)).max(1);
         let hit: Vec<usize> = (0..rays.len()).filter(|i| rays[*i].count > 0).collect();
         let step = hit.len().div_ceil(TWIN_RAYS.min(work)).max(1);
+        let origin = frame.view.origin.as_dvec3();
+        let lines: Vec<(usize, DVec3, Vec<usize>)> = hit
+            .par_iter()
+            .step_by(step)
+            .map(|&i| {
+                let (x, y) = ((i as u32 % frame.width) as f32 + 0.5, (i as u32 / frame.width) as f32 + 0.5);
+                let direction = frame.view.direction(x, y, frame.width, frame.height).as_dvec3();
+                (i, direction, self.twin.met(origin, direction))
+            })
+            .collect();
+        let wanted: BTreeSet<usize> = lines.iter().flat_map(|(.., met)| met).copied().collect();
+        let lit = self.twin.lit(frame, &wanted.into_iter().collect::<Vec<_>>());
         let mut out = Vec::new();
-        for &i in hit.iter().step_by(step) {
-            let seen = self.twin_ray(twin, &lit, frame, i, &rays[i]);
+        for (i, direction, met) in lines {
+            let seen = self.twin.ray(&lit, origin, direction, &pieces_of(&rays[i]), &met);
             findings.compared += 1;
             findings.vague += usize::from(seen.vague);
             for c in 0..3 {
@@ -185,21 +187,6 @@ impl<'a> Subject<'a> {
             out.push((i, seen));
         }
         out
-    }
-
-    fn twin_ray(&self, twin: &Twin, lit: &Lit, frame: &Frame, i: usize, ray: &RayResult) -> Seen {
-        let (x, y) = ((i as u32 % frame.width) as f32 + 0.5, (i as u32 / frame.width) as f32 + 0.5);
-        let direction = frame.view.direction(x, y, frame.width, frame.height).as_dvec3();
-        let pieces: Vec<Piece> = (0..ray.count as usize)
-            .map(|k| Piece {
-                start: f64::from(ray.pieces[k].0),
-                end: f64::from(ray.pieces[k].1),
-                boundary: f64::from(ray.boundary[k]),
-            })
-            .collect();
-        let info = &self.asset.info;
-        let medium = Medium { extinction: DVec3::from(info.extinction) * info.uniform_density };
-        twin.ray(lit, frame.view.origin.as_dvec3(), direction, &pieces, medium)
     }
 
     fn against_gpu(
@@ -243,6 +230,16 @@ impl<'a> Subject<'a> {
         }
         Ok(())
     }
+}
+
+/// The inside pieces of a ray, for the twin.
+fn pieces_of(ray: &RayResult) -> Vec<Piece> {
+    let piece = |k: usize| Piece {
+        start: f64::from(ray.pieces[k].0),
+        end: f64::from(ray.pieces[k].1),
+        boundary: f64::from(ray.boundary[k]),
+    };
+    (0..ray.count as usize).map(piece).collect()
 }
 
 /// Whether two backends found the same inside pieces: ends within 1e-5 diagonals.

@@ -8,33 +8,57 @@ use diaphane_runtime::fold::{Plan, linear};
 use diaphane_runtime::frame::{Frame, FrameLight, LightKind, MOST_IRRADIANCE};
 use glam::DVec3;
 use rayon::prelude::*;
+use std::collections::HashMap;
+use std::sync::OnceLock;
 
 /// Circles of directions in which folded transmittance is projected, twice as many directions each.
 const CIRCLES: usize = 14;
 
-/// Sources of all samples.
-pub struct Lit {
-    /// v at the kernel's centre, per channel.
-    pub value: Vec<[Bounded; 3]>,
-    /// ∇ ln v, per channel, and its largest deviation.
-    pub slope: Vec<[(DVec3, f64); 3]>,
+/// v of samples at their centroids, per channel.
+pub(super) type Values = HashMap<usize, [Bounded; 3]>;
+
+/// v at a kernel's centre, per channel, and ∇ ln v with its largest deviation.
+pub(super) type Source = ([Bounded; 3], [(DVec3, f64); 3]);
+
+/// Sources of samples.
+pub struct Lit(pub(super) HashMap<usize, Source>);
+
+impl Lit {
+    /// Of a sample that was asked for.
+    pub(super) fn of(&self, sample: usize) -> &Source {
+        &self.0[&sample]
+    }
 }
 
-/// Transmittance of all samples as harmonics, [sample][channel][coefficient].
-pub struct Folded(Vec<[Vec<f64>; 3]>);
+/// Transmittance of one sample as harmonics, [channel][coefficient].
+type Projected = Box<[Vec<f64>; 3]>;
+
+/// Transmittance of the samples as harmonics, each projected when it is first asked for.
+pub struct Folded {
+    samples: Vec<OnceLock<Projected>>,
+    /// Directions, their solid angles and harmonics.
+    rule: OnceLock<Vec<(DVec3, f64, Vec<f64>)>>,
+}
+
+impl Folded {
+    /// Of `count` samples, none of which is projected yet.
+    pub fn new(count: usize) -> Self {
+        Self { samples: (0..count).map(|_| OnceLock::new()).collect(), rule: OnceLock::new() }
+    }
+}
 
 const WIDE: usize = MAX_ORDER * MAX_ORDER;
 
 impl Twin<'_> {
-    /// v of every sample at its centroid.
-    pub(super) fn values(&self, frame: &Frame) -> Vec<[Bounded; 3]> {
+    /// v of the samples `needed` at their centroids.
+    pub(super) fn values(&self, frame: &Frame, needed: &[usize]) -> Vec<[Bounded; 3]> {
         let plan = Plan::new(frame, &self.asset.info, None);
         let origin = frame.view.origin.as_dvec3();
         let ambient = (!plan.folded.is_empty()).then(|| self.ambient(frame, &plan.folded));
         let most = f64::from(frame.most_source());
-        (0..self.samples.len())
-            .into_par_iter()
-            .map(|i| {
+        needed
+            .par_iter()
+            .map(|&i| {
                 let mut sum = [Bounded::default(); 3];
                 for light in plan.single.iter().map(|l| &frame.lights[*l]) {
                     let one = self.light_of(i, light, origin, f64::from(frame.least_distance));
@@ -180,14 +204,14 @@ impl Twin<'_> {
     }
 
     fn add_folded(&self, i: usize, ambient: &Ambient, origin: DVec3, sum: &mut [Bounded; 3]) {
-        let folded = self.folded.get_or_init(|| self.fold());
+        let folded = self.folded.samples[i].get_or_init(|| self.fold(i));
         let g = self.asset.info.phase.mean_cosine();
         let deviation = (origin - self.place[i]).normalize_or_zero() - origin.normalize_or_zero();
         let factors =
             if g == 0.0 { [1.0, 0.0, 0.0, 0.0] } else { [1.0, deviation.x, deviation.y, deviation.z] };
         for (c, sum) in sum.iter_mut().enumerate() {
             let (mut value, mut error) = (0.0, 0.0);
-            for (k, t) in folded.0[i][c].iter().enumerate() {
+            for (k, t) in folded[c].iter().enumerate() {
                 let f: f64 = (0..4).map(|v| factors[v] * ambient.values[k][v][c]).sum();
                 let size: f64 = (0..4).map(|v| factors[v].abs() * ambient.sizes[k][v][c]).sum();
                 value += t * f;
@@ -204,33 +228,34 @@ impl Twin<'_> {
         }
     }
 
-    /// The projection of [`diaphane_runtime::fold::linear`]: Gauss-Legendre nodes along z, even steps around.
-    fn fold(&self) -> Folded {
-        let count = linear::BANDS * linear::BANDS;
-        let rule = super::kernels::gauss(CIRCLES);
-        let mut directions = Vec::new();
-        for (z, weight) in rule {
-            for k in 0..2 * CIRCLES {
-                let phi = std::f64::consts::TAU * (k as f64 + 0.5) / (2 * CIRCLES) as f64;
-                let r = (1.0 - z * z).sqrt();
-                let to = DVec3::new(r * phi.cos(), r * phi.sin(), z).as_vec3().as_dvec3();
-                let mut basis = vec![0.0; count];
-                sh::evaluate(linear::BANDS, to.to_array(), &mut basis);
-                directions.push((to, weight * std::f64::consts::TAU / (2 * CIRCLES) as f64, basis));
+    /// The projection of [`diaphane_runtime::fold::linear`] of sample `i`.
+    fn fold(&self, i: usize) -> Projected {
+        let mut sums = Box::new(std::array::from_fn(|_| vec![0.0; linear::BANDS * linear::BANDS]));
+        for (to, solid_angle, basis) in self.folded.rule.get_or_init(rule) {
+            let psi = self.arriving(i, *to, 0.0);
+            for (sum, psi) in sums.iter_mut().zip(&psi) {
+                let add = |(s, y): (&mut f64, &f64)| *s += psi.value * solid_angle * y;
+                sum.iter_mut().zip(basis).for_each(add);
             }
         }
-        let one = |i: usize| {
-            let mut sums = [vec![0.0; count], vec![0.0; count], vec![0.0; count]];
-            for (to, solid_angle, basis) in &directions {
-                let psi = self.arriving(i, *to, 0.0);
-                for (sum, psi) in sums.iter_mut().zip(&psi) {
-                    sum.iter_mut().zip(basis).for_each(|(s, y)| *s += psi.value * solid_angle * y);
-                }
-            }
-            sums
-        };
-        Folded((0..self.samples.len()).into_par_iter().map(one).collect())
+        sums
     }
+}
+
+/// Gauss-Legendre nodes along z, even steps around: directions, their solid angles and harmonics.
+fn rule() -> Vec<(DVec3, f64, Vec<f64>)> {
+    let mut directions = Vec::new();
+    for (z, weight) in super::kernels::gauss(CIRCLES) {
+        for k in 0..2 * CIRCLES {
+            let phi = std::f64::consts::TAU * (k as f64 + 0.5) / (2 * CIRCLES) as f64;
+            let r = (1.0 - z * z).sqrt();
+            let to = DVec3::new(r * phi.cos(), r * phi.sin(), z).as_vec3().as_dvec3();
+            let mut basis = vec![0.0; linear::BANDS * linear::BANDS];
+            sh::evaluate(linear::BANDS, to.to_array(), &mut basis);
+            directions.push((to, weight * std::f64::consts::TAU / (2 * CIRCLES) as f64, basis));
+        }
+    }
+    directions
 }
 
 /// Rounding of a projected coefficient: ∫|Y| ≤ 3.6 times the mean rounding of ψ and of a sum of 392 terms.

@@ -13,9 +13,10 @@
 mod kernels;
 mod light;
 mod phase;
+mod profile;
 mod slopes;
 
-pub use kernels::{Medium, Piece, Seen};
+pub use kernels::{Piece, Seen};
 pub use light::Lit;
 
 use diaphane_formats::asset::{Asset, Samples};
@@ -24,7 +25,7 @@ use diaphane_formats::slopes::Stencil;
 use diaphane_runtime::frame::Frame;
 use diaphane_runtime::usable::{largest_extinction, usable_samples};
 use glam::DVec3;
-use std::sync::OnceLock;
+use std::collections::BTreeSet;
 
 /// Unit roundoff of single precision.
 pub const U: f64 = 5.960_464_477_539_063e-8;
@@ -48,7 +49,10 @@ pub struct Twin<'a> {
     place: Vec<DVec3>,
     centre: Vec<DVec3>,
     sharpness: Vec<f64>,
-    folded: OnceLock<light::Folded>,
+    /// κ per channel: of the homogeneous medium, or at density 1.
+    extinction: DVec3,
+    density: Option<profile::Density<'a>>,
+    folded: light::Folded,
 }
 
 impl<'a> Twin<'a> {
@@ -74,15 +78,30 @@ impl<'a> Twin<'a> {
                 .map(|p| 2.0 * std::f64::consts::LN_2.sqrt() / (fwhm * f64::from(p[3])))
                 .collect(),
             place,
+            extinction: DVec3::from(asset.info.extinction)
+                * if asset.density.is_some() { 1.0 } else { asset.info.uniform_density },
+            density: asset.density.as_ref().map(profile::Density::new),
+            folded: light::Folded::new(samples.len()),
             asset,
             samples,
-            folded: OnceLock::new(),
         }
     }
 
-    /// Sources under the lights of a frame.
-    pub fn lit(&self, frame: &Frame) -> Lit {
-        let values = self.values(frame);
-        self.sources(&values)
+    /// Sources of the samples `wanted` (each once) under the lights of a frame.
+    pub fn lit(&self, frame: &Frame, wanted: &[usize]) -> Lit {
+        let around = wanted.iter().flat_map(|i| self.neighbours(*i)).chain(wanted.iter().copied());
+        let needed: Vec<usize> = around.collect::<BTreeSet<_>>().into_iter().collect();
+        let values = needed.iter().copied().zip(self.values(frame, &needed)).collect();
+        self.sources(&values, wanted)
+    }
+
+    /// The samples whose values give the slope at sample `i`.
+    fn neighbours(&self, i: usize) -> impl Iterator<Item = usize> + '_ {
+        self.stencil.spokes[i].iter().map(|s| s.neighbour as usize).filter(move |j| *j != i)
+    }
+
+    /// Largest density on a ray.
+    fn densest(&self) -> f64 {
+        self.density.as_ref().map_or(1.0, |d| d.most)
     }
 }

@@ -1,20 +1,18 @@
 //! Slopes of ln v and the values at the kernels' centres: the head of `formats`' `slopes` in double precision.
 
-use super::light::Lit;
+use super::light::{Lit, Source, Values};
 use super::{Bounded, Twin, U};
 use diaphane_formats::slopes::{CELL_RADIUS, MOST_EXPONENT, MOST_RATIO};
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
 impl Twin<'_> {
-    /// Sources from the values at the centroids.
-    pub(super) fn sources(&self, values: &[[Bounded; 3]]) -> Lit {
-        let of: Vec<_> = (0..values.len()).into_par_iter().map(|i| self.source(values, i)).collect();
-        let (value, slope) = of.into_iter().unzip();
-        Lit { value, slope }
+    /// Sources of the samples `wanted` from the values at their centroids and their neighbours'.
+    pub(super) fn sources(&self, values: &Values, wanted: &[usize]) -> Lit {
+        Lit(wanted.par_iter().map(|i| (*i, self.source(values, *i))).collect())
     }
 
-    fn source(&self, values: &[[Bounded; 3]], i: usize) -> ([Bounded; 3], [(DVec3, f64); 3]) {
+    fn source(&self, values: &Values, i: usize) -> Source {
         let gradients = self.gradients(i);
         let info = &self.asset.info;
         let to_centre = self.centre[i] - self.place[i];
@@ -24,14 +22,14 @@ impl Twin<'_> {
         let (most, limit) = (f64::from(MOST_RATIO), f64::from(self.stencil.limit[i]));
         let exponents = f64::from(MOST_EXPONENT);
         let mut out = ([Bounded::default(); 3], [(DVec3::ZERO, 0.0); 3]);
-        for (c, own) in values[i].iter().copied().enumerate() {
+        for (c, own) in values[&i].iter().copied().enumerate() {
             if own.value <= 0.0 {
                 out.0[c] = own;
                 continue;
             }
             let (mut h, mut error) = (DVec3::ZERO, 0.0);
             for (j, gradient, relative) in &gradients {
-                let other = values[*j][c];
+                let other = values[j][c];
                 let log = (other.value / own.value).ln().clamp(-most, most);
                 // Each end of the ratio's range, with the limits applied.
                 let up = (other.value + other.error) / (own.value - own.error).max(0.0);
@@ -66,8 +64,7 @@ impl Twin<'_> {
 
     /// Neighbours, the vectors that their ln ratios are multiplied with, and those vectors' relative error.
     fn gradients(&self, i: usize) -> Vec<(usize, DVec3, f64)> {
-        let found: Vec<usize> =
-            self.stencil.spokes[i].iter().map(|s| s.neighbour as usize).filter(|j| *j != i).collect();
+        let found: Vec<usize> = self.neighbours(i).collect();
         let offsets: Vec<DVec3> = found.iter().map(|j| self.place[*j] - self.place[i]).collect();
         let reach = offsets.iter().map(|d| d.length()).fold(0.0, f64::max);
         if reach <= 0.0 {
