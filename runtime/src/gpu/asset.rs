@@ -10,6 +10,7 @@ use super::splatting::SplatPath;
 use super::targets::PixelState;
 use super::uniforms::MediumUniform;
 use crate::cpu::surface::corner_normals;
+use crate::rendered::MAX_PIECES;
 use crate::usable::{density_at, usable_samples};
 use crate::{Error, Result};
 use diaphane_formats::asset::{Asset, Info, Samples};
@@ -211,6 +212,13 @@ impl AssetBuffers {
         let several = self.slabs.are_several_for(asset.density.as_ref());
         (self.fresnel, self.boundary_order, self.heterogeneous, self.slabs.are_several())
             == (asset.info.ior != 1.0, boundary_order, asset.density.is_some(), several)
+    }
+
+    /// Pieces of a ray that one dispatch sums: all by tiles, unless the density varies, whose profiles are kept of one alone, or
+    /// sums are kept from shard to shard.
+    pub fn pieces_at_once(&self, path: SplatPath) -> usize {
+        let one = path == SplatPath::Quads || self.heterogeneous || self.pixel_state().kept;
+        if one { 1 } else { MAX_PIECES }
     }
 
     /// The code that the material needs.

@@ -3,12 +3,14 @@
 use super::faults::Faults;
 use super::host::Renderer;
 use crate::{Error, Result};
+use std::sync::LazyLock;
 use wgpu::{
     Adapter, Backends, Device, DeviceDescriptor, DeviceType, DownlevelFlags, Features, Instance,
     InstanceDescriptor, Queue, Surface,
 };
 
-/// A device with its queue, and the complaints that reached nobody else.
+/// A device with its queue, and the complaints that reached nobody else. Clones are the same device.
+#[derive(Clone)]
 pub struct GpuDevice {
     /// The device.
     pub device: Device,
@@ -28,9 +30,12 @@ const NEEDED_FLAGS: DownlevelFlags = DownlevelFlags::COMPUTE_SHADERS
     .union(DownlevelFlags::VERTEX_STORAGE)
     .union(DownlevelFlags::INDIRECT_EXECUTION);
 
-/// An instance with all backends of this platform; the environment variables that wgpu knows apply.
+/// An instance with all backends of this platform; the environment variables that wgpu knows apply. The process has one, which
+/// stays: NVIDIA's driver 580 is not found any more after it was let go of and loaded again some thirty times.
 pub fn instance() -> Instance {
-    Instance::new(InstanceDescriptor::new_without_display_handle().with_env())
+    static INSTANCE: LazyLock<Instance> =
+        LazyLock::new(|| Instance::new(InstanceDescriptor::new_without_display_handle().with_env()));
+    INSTANCE.clone()
 }
 
 impl GpuDevice {

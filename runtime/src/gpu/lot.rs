@@ -21,7 +21,10 @@ pub(super) struct Lot {
     pub tiles: u64,
     /// That the samples are cut into, each of which sums for itself.
     pub slices: u32,
-    /// Sums that are kept of all pixels: from shard to shard, and of every slice.
+    /// Workgroups that share a square of 16 × 16 pixels: for every slice one or, where sums are kept for slices alone, one for
+    /// each half of the square.
+    pub sharers: u32,
+    /// Sums that are kept of all pixels: from shard to shard, of every slice and of every piece that is drawn at once.
     pub sums: u64,
 }
 
@@ -36,7 +39,7 @@ pub(super) struct Place {
 impl Default for Lot {
     /// Nothing.
     fn default() -> Self {
-        Self { size: [0; 2], count: 0, pixels: 0, cells: 0, tiles: 0, slices: 1, sums: 0 }
+        Self { size: [0; 2], count: 0, pixels: 0, cells: 0, tiles: 0, slices: 1, sharers: 1, sums: 0 }
     }
 }
 
@@ -66,33 +69,37 @@ impl Lot {
             cells: self.cells.max(other.cells),
             tiles: self.tiles.max(other.tiles),
             slices: self.slices.max(other.slices),
+            sharers: self.sharers.max(other.sharers),
             sums: self.sums.max(other.sums),
         }
     }
 
     /// Whether what is made for it is enough for another.
     pub fn holds(self, other: Self) -> bool {
-        let size = |lot: Self| Self { count: 0, slices: 1, ..lot };
+        let size = |lot: Self| Self { count: 0, slices: 1, sharers: 1, ..lot };
         size(self.or(other)) == size(self)
     }
 
-    /// Cut into as many slices as make `wanted` workgroups of its tiles, where there are `clusters` of samples and at most so many
-    /// sums can be kept.
-    pub fn sliced(self, wanted: u32, clusters: u32, most_sums: u64) -> Self {
-        let most = u64::from(clusters / LEAST_CLUSTERS).min(most_sums / self.pixels.max(1));
+    /// Cut into as many slices as make `wanted` workgroups of its tiles, where there are `clusters` of samples, `pieces` are drawn
+    /// at once and at most so many sums can be kept.
+    pub fn sliced(self, wanted: u32, clusters: u32, pieces: u64, most_sums: u64) -> Self {
+        let most = u64::from(clusters).min(most_sums / (pieces * self.pixels).max(1));
         let slices = (u64::from(wanted) / self.tiles.max(1)).min(most).max(1) as u32;
-        let sums = if slices > 1 { self.pixels * u64::from(slices) } else { self.sums };
-        Self { slices, sums, ..self }
+        if slices == 1 {
+            return self;
+        }
+        let sums = self.pixels * pieces * u64::from(slices);
+        Self { slices, sharers: slices * SHARED_HALVES, sums, ..self }
     }
 
     /// The same where samples are several shards.
     pub fn kept(self) -> Self {
-        Self { sums: self.pixels * u64::from(self.slices), ..self }
+        Self { sums: self.pixels * u64::from(self.slices), sharers: self.slices, ..self }
     }
 }
 
-/// Clusters of samples of a slice at the least.
-const LEAST_CLUSTERS: u32 = 2;
+/// Halves of a square of pixels, each of which has a workgroup where samples are cut into slices alone.
+const SHARED_HALVES: u32 = 2;
 
 impl From<Tile> for Lot {
     fn from(tile: Tile) -> Self {
@@ -122,11 +129,15 @@ mod tests {
     #[test]
     fn few_tiles_are_cut_into_slices() {
         let lot = Lot::from(Tile { start: [0; 2], size: [45, 45] });
-        let sliced = |wanted, clusters| lot.sliced(wanted, clusters, 1 << 20);
+        let sliced = |wanted, clusters| lot.sliced(wanted, clusters, 4, 1 << 20);
         let slices = |wanted, clusters| sliced(wanted, clusters).slices;
-        assert_eq!([slices(0, 100), slices(9, 100), slices(1024, 100), slices(1024, 3)], [1, 1, 50, 1]);
-        assert_eq!((sliced(90, 100).sums, sliced(9, 100).sums, lot.kept().sums), (20250, 0, 2025));
+        assert_eq!([slices(0, 100), slices(9, 100), slices(1024, 100), slices(1024, 3)], [1, 1, 100, 3]);
+        assert_eq!((sliced(90, 100).sums, sliced(9, 100).sums, lot.kept().sums), (81_000, 0, 2025));
+        assert_eq!(
+            [sliced(90, 100).sharers, sliced(9, 100).sharers, sliced(90, 100).kept().sharers],
+            [20, 1, 10]
+        );
         assert!(!lot.holds(sliced(90, 100)) && sliced(90, 100).holds(lot.kept()));
-        assert_eq!(lot.sliced(1024, 100, 10_000).slices, 4);
+        assert_eq!(lot.sliced(1024, 100, 4, 40_000).slices, 4);
     }
 }

@@ -352,7 +352,7 @@ impl Pipeline {
             segments: self.segments.bind(device, targets),
             outlines: each(&|s| self.outlines.bind(device, s, targets)),
             batches: each(&|s| self.batches.bind(device, s, targets)),
-            pieces: (0..MAX_PIECES).map(piece).collect(),
+            pieces: (0..MAX_PIECES).step_by(self.pieces_at_once()).map(piece).collect(),
         }
     }
 }

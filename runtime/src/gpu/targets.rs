@@ -67,7 +67,7 @@ pub(super) struct Targets {
     pub cells: Buffer,
     /// See [`crate::rendered::Census`]; [`CENSUS`] bytes.
     pub census: Buffer,
-    /// Sums of the current piece, where samples are several shards or slices and drawn by tiles.
+    /// Sums of the current pieces, where samples are several shards or slices and drawn by tiles.
     pub kept: Buffer,
     pub marker: TextureView,
     pub numerator: TextureView,
@@ -184,10 +184,15 @@ impl Targets {
 
     /// Piece `k` of every pixel.
     pub fn piece(&self, k: usize) -> wgpu::BindingResource<'_> {
+        self.pieces(k, 1)
+    }
+
+    /// So many pieces of every pixel from the `k`th on.
+    pub fn pieces(&self, k: usize, count: usize) -> wgpu::BindingResource<'_> {
         wgpu::BindingResource::Buffer(BufferBinding {
             buffer: &self.pieces,
             offset: k as u64 * self.stride * PIECE,
-            size: wgpu::BufferSize::new(self.stride * PIECE),
+            size: wgpu::BufferSize::new(count as u64 * self.stride * PIECE),
         })
     }
 

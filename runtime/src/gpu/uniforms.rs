@@ -53,7 +53,8 @@ pub(super) struct ViewUniform {
     pub per_unit: f32,
     pub slices: u32,
     pub pixels: u32,
-    pub unused: [u32; 19],
+    pub sharers: u32,
+    pub unused: [u32; 18],
 }
 
 /// What a frame's rays need to know about its lights.
@@ -121,7 +122,8 @@ impl ViewUniform {
             per_unit: 1.0,
             slices: 1,
             pixels: tile.pixels() as u32,
-            unused: [0; 19],
+            sharers: 1,
+            unused: [0; 18],
         }
     }
 
@@ -133,7 +135,8 @@ impl ViewUniform {
 
     /// The same as one of a lot.
     pub fn of(self, lot: &Lot) -> Self {
-        Self { viewport: lot.size, slices: lot.slices, pixels: lot.pixels as u32, ..self }
+        let Lot { size, slices, sharers, pixels, .. } = *lot;
+        Self { viewport: size, slices, sharers, pixels: pixels as u32, ..self }
     }
 }
 
@@ -335,7 +338,8 @@ mod tests {
             first_ambient,
             per_unit,
             slices,
-            pixels
+            pixels,
+            sharers
         );
         mirrors!(
             MediumUniform,

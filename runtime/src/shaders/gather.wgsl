@@ -1,7 +1,7 @@
-// Gather pass: the kernels along the current piece of every pixel of a tile, summed in registers, and what comes of
+// Gather pass: the kernels along the inside pieces of every pixel of a tile, summed in registers, and what comes of
 // them added to the picture: splat and resolve in one, without blending. (Where the samples are several shards sums are kept
-// from one to the next; where tiles are few, several workgroups share a tile, a slice of the samples each. The resolve pass
-// follows both.)
+// from one to the next; where tiles are few, several workgroups share a tile, a slice of the samples and a half of the pixels
+// each. The resolve pass follows both.)
 //
 // A workgroup first finds the clusters of 64 samples that rays of its tile may meet, then those of their samples; the
 // bits of `marks` keep them in order, so that the sums do not depend on threads. Each thread then has two pixels side by
@@ -13,12 +13,17 @@
 @group(1) @binding(0) var<storage, read> samples: array<vec4f>;
 @group(1) @binding(1) var<storage, read> sources: array<vec4f>;  // SOURCE a sample: v, weight; slopes
 @group(1) @binding(2) var<storage, read> tiles: array<u32>;      // column, row (13 bits each) and object of those with pixels inside
-@group(1) @binding(3) var<storage, read> piece: array<vec4f>;
+@group(1) @binding(3) var<storage, read> pieces: array<vec4f>;   // PIECES of every pixel
 @group(1) @binding(4) var<storage, read> profile: array<vec4f>;
+
+// That a workgroup goes through: where the density varies, or samples are several shards, each has a dispatch of its own.
+override PIECES: u32 = 4u;
+// Of a tile that are a workgroup's: it has the upper and the lower, or one of them.
+override HALVES: u32 = 2u;
 
 const SOURCE: u32 = 4u;
 const SIDE: u32 = 16u;          // of a tile, pixels
-const HALVES: u32 = 2u;         // upper and lower: threads have two pixels in each
+const MOST_HALVES: u32 = 2u;    // upper and lower: threads have two pixels in each
 const CLUSTER: u32 = 64u;       // samples of a cluster, and threads of a workgroup
 const WORDS: u32 = 32u;
 const ROUND: u32 = 1024u;       // bits of all words: clusters looked at together
@@ -49,8 +54,8 @@ fn corner_direction(corner: vec2u) -> vec3f {
     return normalize(d);
 }
 
-fn cone_of(low: vec2u, near: f32, far: f32) -> Cone {
-    let high = low + SIDE;
+// Of the rays between two corners.
+fn cone_of(low: vec2u, high: vec2u, near: f32, far: f32) -> Cone {
     let a = corner_direction(low);
     let b = corner_direction(vec2u(high.x, low.y));
     let c = corner_direction(vec2u(low.x, high.y));
@@ -126,21 +131,21 @@ fn add_kernel(before: PairSums, kernel: Kernel, rays: Pair) -> PairSums {
         sum(before.right, contribution(kernel, rays.right.index, rays.right.direction, rays.right.ends.xy)));
 }
 
-fn ray_at(pixel: vec2u) -> Ray {
+fn ray_at(pixel: vec2u, piece: u32) -> Ray {
     var ray = Ray(0u, vec4f(0.0), ray_direction(pixel));
     if (all(pixel < view.tile_size)) {
         ray.index = pixel_index(pixel);
-        ray.ends = piece[ray.index];
+        ray.ends = pieces[piece * (arrayLength(&pieces) / PIECES) + ray.index];
     }
     return ray;
 }
 
 // Eight threads that follow each other have 4 x 4 pixels, and so on.
-fn rays_of(tile: vec2u, half: u32, local: u32) -> Pair {
+fn rays_of(tile: vec2u, piece: u32, half: u32, local: u32) -> Pair {
     let x = 2u * (local & 1u) + ((local >> 1u) & 4u) + ((local >> 2u) & 8u);
     let y = ((local >> 1u) & 3u) + ((local >> 2u) & 4u) + 8u * half;
     let pixel = tile * SIDE + vec2u(x, y);
-    return Pair(ray_at(pixel), ray_at(pixel + vec2u(1u, 0u)));
+    return Pair(ray_at(pixel, piece), ray_at(pixel + vec2u(1u, 0u), piece));
 }
 
 fn is_inside(ray: Ray) -> bool {
@@ -180,8 +185,29 @@ fn pick_tile(group: u32) -> vec2u {
     return vec2u(listed_tile & 0x1fffu, (listed_tile >> 13u) & 0x1fffu);
 }
 
-// One of 64 threads of a tile and a slice of the samples; `lane` of `lanes` that can talk.
-fn gather(tile: vec2u, slice: u32, local: u32, lane: u32, lanes: u32) {
+// One of 64 threads of a tile; `sharer` says which slice of the samples and which half are its workgroup's; `lane` of
+// `lanes` that can talk.
+fn gather(tile: vec2u, sharer: u32, local: u32, lane: u32, lanes: u32) {
+    let shares = MOST_HALVES / HALVES;
+    let first_half = sharer % shares * HALVES;
+    for (var piece = 0u; piece < PIECES; piece++) {
+        // Where no ray has this one none has a further one.
+        if (!gather_piece(tile, piece, sharer / shares, first_half, local, lane, lanes)) {
+            break;
+        }
+    }
+}
+
+// Whether any ray has the piece.
+fn gather_piece(
+    tile: vec2u,
+    piece: u32,
+    slice: u32,
+    first_half: u32,
+    local: u32,
+    lane: u32,
+    lanes: u32,
+) -> bool {
     if (local < WORDS) {
         atomicStore(&marks[local], 0u);
     }
@@ -190,7 +216,7 @@ fn gather(tile: vec2u, slice: u32, local: u32, lane: u32, lanes: u32) {
     }
     workgroupBarrier();
     for (var half = 0u; half < HALVES; half++) {
-        let rays = rays_of(tile, half, local);
+        let rays = rays_of(tile, piece, first_half + half, local);
         bound(rays.left);
         bound(rays.right);
     }
@@ -204,13 +230,15 @@ fn gather(tile: vec2u, slice: u32, local: u32, lane: u32, lanes: u32) {
     }
     let reach = workgroupUniformLoad(&range);
     if (reach.y < reach.x) {
-        return;
+        return false;
     }
-    let cone = cone_of(tile * SIDE, reach.x, reach.y);
-    var sums: array<PairSums, HALVES>;
+    let rows = SIDE / MOST_HALVES;
+    let corner = tile * SIDE + vec2u(0u, first_half * rows);
+    let cone = cone_of(corner, corner + vec2u(SIDE, HALVES * rows), reach.x, reach.y);
+    var sums: array<PairSums, MOST_HALVES>;
     for (var half = 0u; half < HALVES; half++) {
-        let rays = rays_of(tile, half, local);
-        sums[half] = PairSums(begin(rays.left, slice), begin(rays.right, slice));
+        let rays = rays_of(tile, piece, first_half + half, local);
+        sums[half] = PairSums(begin(rays.left, piece, slice), begin(rays.right, piece, slice));
     }
     // All tiles have as many slices; the same for all threads, as barriers want it.
     let clusters = (medium.samples + CLUSTER - 1u) / CLUSTER;
@@ -253,7 +281,7 @@ fn gather(tile: vec2u, slice: u32, local: u32, lane: u32, lanes: u32) {
             // The next group may list as many again.
             if (end == hits || known > ROUND) {
                 for (var half = 0u; half < HALVES; half++) {
-                    sums[half] = add_listed(sums[half], known, lane, lanes, rays_of(tile, half, local));
+                    sums[half] = add_listed(sums[half], known, lane, lanes, rays_of(tile, piece, first_half + half, local));
                 }
                 known = 0u;
             }
@@ -261,8 +289,11 @@ fn gather(tile: vec2u, slice: u32, local: u32, lane: u32, lanes: u32) {
         }
     }
     for (var half = 0u; half < HALVES; half++) {
-        let rays = rays_of(tile, half, local);
-        finish(rays.left, slice, sums[half].left);
-        finish(rays.right, slice, sums[half].right);
+        let rays = rays_of(tile, piece, first_half + half, local);
+        finish(rays.left, piece, slice, sums[half].left);
+        finish(rays.right, piece, slice, sums[half].right);
     }
+    // The next piece begins anew with what all threads have read.
+    workgroupBarrier();
+    return true;
 }

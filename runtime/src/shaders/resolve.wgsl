@@ -1,9 +1,9 @@
-// Resolve pass: radiance of the current piece of each pixel as seen through the pieces in front, added to the
-// picture. Twin of `reconstruct::Along` and the end of `piece_radiance`. Where sums come from, `sums_at`, follows in
+// Resolve pass: radiance of the pieces of each pixel as seen through those in front, added to the picture. Twin of `reconstruct::Along` and the end of `piece_radiance`. Where sums come from, `sums_at`, follows in
 // resolve_blended.wgsl or resolve_kept.wgsl.
 override HETEROGENEOUS: bool = false;
+override PIECES: u32 = 1u; // see gather.wgsl
 
-@group(1) @binding(0) var<storage, read> piece: array<vec4f>;
+@group(1) @binding(0) var<storage, read> pieces: array<vec4f>;
 @group(1) @binding(1) var<storage, read> profile: array<vec4f>;
 @group(1) @binding(2) var<storage, read_write> front: array<vec4f>;
 @group(1) @binding(3) var<storage, read_write> radiance: array<vec4f>;
@@ -22,10 +22,12 @@ fn resolve(@builtin(global_invocation_id) pixel: vec3u) {
         return;
     }
     let index = pixel_index(pixel.xy);
-    let ends = piece[index];
-    if (ends.y <= ends.x) {
-        return;
+    for (var piece = 0u; piece < PIECES; piece++) {
+        let ends = pieces[piece * (arrayLength(&pieces) / PIECES) + index];
+        if (ends.y <= ends.x) {
+            break;
+        }
+        let sums = sums_at(pixel.xy, index, piece);
+        join(index, ends, sums.numerator, sums.denominator, sums.kernels);
     }
-    let sums = sums_at(pixel.xy, index);
-    join(index, ends, sums.numerator, sums.denominator, sums.kernels);
 }

@@ -79,7 +79,7 @@ fn list_tile(k: u32, tile: vec3u, columns: u32) {
     if (atomicExchange(&arguments[mark], 1u) == 0u) {
         let place = atomicAdd(&arguments[k * ARGUMENTS + OVER_TILES], 1u);
         atomicStore(&arguments[LISTS + k * stride + place], tile.x | (tile.y << 13u) | (tile.z << 26u));
-        atomicMax(&arguments[k * ARGUMENTS + OVER_TILES + 1u], view.slices);
+        atomicMax(&arguments[k * ARGUMENTS + OVER_TILES + 1u], view.sharers);
         atomicMax(&arguments[k * ARGUMENTS + OVER_TILES + 2u], 1u);
     }
 }

@@ -1,12 +1,14 @@
 //! Which bodies the GPU draws.
 
+use super::axes::SCATTERINGS;
 use diaphane_formats::asset::Asset;
-use diaphane_runtime::gpu::GpuRenderer;
-use diaphane_runtime::{Error, Result};
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use diaphane_runtime::gpu::{GpuDevice, GpuRenderer, instance};
+use diaphane_runtime::Result;
+use std::sync::OnceLock;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Why a software adapter leaves most cells out.
-pub const SOFTWARE: &str = "a software adapter draws one scattering of every fourth body";
+const SOFTWARE: &str = "a software adapter draws one scattering of every fourth body";
 
 /// A software adapter draws every so manieth body.
 const EVERY: usize = 4;
@@ -14,16 +16,15 @@ const EVERY: usize = 4;
 /// The adapter, as far as it is known.
 pub struct Gpu {
     wanted: bool,
-    missing: AtomicBool,
-    software: AtomicBool,
+    /// One for each scattering, whose renderers follow each other, or why there is none.
+    devices: [OnceLock<std::result::Result<GpuDevice, String>>; SCATTERINGS.len()],
     body: AtomicUsize,
 }
 
 impl Gpu {
     /// A GPU that is `wanted` or not.
     pub fn new(wanted: bool) -> Self {
-        let (missing, software, body) = (false.into(), false.into(), 0.into());
-        Self { wanted, missing, software, body }
+        Self { wanted, devices: Default::default(), body: 0.into() }
     }
 
     /// Body number `b` is next.
@@ -31,14 +32,15 @@ impl Gpu {
         self.body.store(b, Ordering::Relaxed);
     }
 
-    /// Whether one was looked for in vain.
-    pub fn is_missing(&self) -> bool {
-        self.missing.load(Ordering::Relaxed)
-    }
-
-    /// Whether it is a program itself.
-    pub fn is_software(&self) -> bool {
-        self.software.load(Ordering::Relaxed)
+    /// Why cells were not drawn.
+    pub fn why_not(&self) -> String {
+        let known = || self.devices.iter().filter_map(OnceLock::get);
+        let software = || known().flatten().any(GpuDevice::is_software);
+        match known().find_map(|d| d.as_ref().err()) {
+            Some(reason) => format!("no adapter: {reason}"),
+            None if software() => SOFTWARE.to_owned(),
+            None => "no ray passes the object".to_owned(),
+        }
     }
 
     /// The renderer of an asset under scattering number `s` of its body; `None` where it is not to be drawn.
@@ -46,21 +48,17 @@ impl Gpu {
     /// # Errors
     /// An adapter that fails.
     pub fn renderer(&self, asset: &Asset, s: usize) -> Result<Option<GpuRenderer>> {
-        let some = s == 0 && self.body.load(Ordering::Relaxed).is_multiple_of(EVERY);
-        if !self.wanted || self.is_missing() || (self.is_software() && !some) {
+        if !self.wanted {
             return Ok(None);
         }
-        match GpuRenderer::new(asset, None) {
-            Ok(renderer) => {
-                let software = renderer.adapter().ends_with("software)");
-                self.software.store(software, Ordering::Relaxed);
-                Ok((some || !software).then_some(renderer))
-            }
-            Err(Error::NoAdapter(_)) => {
-                self.missing.store(true, Ordering::Relaxed);
-                Ok(None)
-            }
-            Err(e) => Err(e),
+        let open = || GpuDevice::open(&instance(), None).map_err(|e| e.to_string());
+        let Ok(device) = self.devices[s % self.devices.len()].get_or_init(open) else {
+            return Ok(None);
+        };
+        let some = s == 0 && self.body.load(Ordering::Relaxed).is_multiple_of(EVERY);
+        if device.is_software() && !some {
+            return Ok(None);
         }
+        GpuRenderer::on(device.clone(), asset, None).map(Some)
     }
 }

@@ -3,7 +3,7 @@
 use super::axes::Scattering;
 use super::body::{Baked, bake_body};
 use super::check::{Findings, Subject, dyed};
-use super::gpu::{Gpu, SOFTWARE};
+use super::gpu::Gpu;
 use super::plan::{Body, Cell, PLAIN, Plan};
 use super::table::{Line, Report};
 use diaphane_bake::progress::Progress;
@@ -51,12 +51,12 @@ pub fn run(plan: &Plan, settings: Settings, progress: &dyn Progress, done: &dyn 
         }
         done(&name, cells.len());
     }
-    if gpu.is_missing() {
-        report.skip("gpu", "no adapter", plan.cells());
-    } else if settings.gpu {
-        let drawn = report.lines.iter().filter(|l| l.findings.gpu_rays > 0).count();
-        let what = if gpu.is_software() { SOFTWARE } else { "no ray passes the object" };
-        report.skip("gpu", what, plan.cells() - drawn);
+    if settings.gpu {
+        let left = |l: &&Line| l.findings.gpu_rays == 0 && l.findings.skipped.iter().all(|(c, _)| *c != "gpu");
+        match report.lines.iter().filter(left).count() {
+            0 => (),
+            cells => report.skip("gpu", &gpu.why_not(), cells),
+        }
     }
     report.seconds = begun.elapsed().as_secs_f64();
     report

@@ -1,10 +1,11 @@
-//! The gather pass: every sample's kernel along one inside piece of every pixel, tile by tile, and the result added to
+//! The gather pass: every sample's kernel along the inside pieces of every pixel, tile by tile, and the result added to
 //! the picture.
 
 use super::super::asset::{AssetBuffers, Variant};
 use super::super::bindings::{Slot, compute, group, layout, pipeline_layout};
 use super::super::shaders;
 use super::super::shard::Shard;
+use super::super::splatting::SplatPath;
 use super::super::targets::{ARGUMENTS, OVER_TILES, Targets};
 use super::super::timers::Pass;
 use super::Recorder;
@@ -22,6 +23,10 @@ pub(crate) struct Gather {
     pipeline: ComputePipeline,
     /// Whether sums are kept for the resolve pass.
     kept: bool,
+    /// Pieces that a dispatch sums.
+    pieces: usize,
+    /// Halves of its square of pixels that a workgroup has.
+    halves: u32,
 }
 
 impl Gather {
@@ -40,15 +45,19 @@ impl Gather {
         };
         let module = shaders::module(device, "gather", source);
         let variant = asset.variant();
-        let pipeline = Self::pipeline(device, &pipeline_layout, &module, variant);
-        Self { layout, pipeline_layout, module, variant, pipeline, kept }
+        let pieces = asset.pieces_at_once(SplatPath::Tiles);
+        // Slices are for few squares, whose workgroups had better be many than large.
+        let halves = if kept && !asset.pixel_state().kept { 1 } else { 2 };
+        let pipeline = Self::pipeline(device, &pipeline_layout, &module, variant, pieces, halves);
+        Self { layout, pipeline_layout, module, variant, pipeline, kept, pieces, halves }
     }
 
     /// Compiles the pass anew where another material needs other code.
     pub fn set_variant(&mut self, device: &Device, variant: Variant) {
         if variant != self.variant {
             self.variant = variant;
-            self.pipeline = Self::pipeline(device, &self.pipeline_layout, &self.module, variant);
+            let Self { pipeline_layout, module, pieces, halves, .. } = &*self;
+            self.pipeline = Self::pipeline(device, pipeline_layout, module, variant, *pieces, *halves);
         }
     }
 
@@ -57,8 +66,12 @@ impl Gather {
         layout: &PipelineLayout,
         module: &ShaderModule,
         variant: Variant,
+        pieces: usize,
+        halves: u32,
     ) -> ComputePipeline {
-        compute(device, "gather", layout, module, &variant.constants())
+        let own = [("PIECES", pieces as f64), ("HALVES", f64::from(halves))];
+        let constants = [&variant.constants()[..], &own].concat();
+        compute(device, "gather", layout, module, &constants)
     }
 
     pub fn bind(&self, device: &Device, shard: &Shard, targets: &Targets, piece: usize) -> BindGroup {
@@ -67,7 +80,7 @@ impl Gather {
             shard.samples.as_entire_binding(),
             shard.sources.as_entire_binding(),
             t.tiles(piece),
-            t.piece(piece),
+            t.pieces(piece, self.pieces),
             t.profile.as_entire_binding(),
         ];
         let sums = if self.kept { &[&t.kept][..] } else { &[&t.front, &t.radiance, &t.counters] };
@@ -75,7 +88,7 @@ impl Gather {
         group(device, "gather", &self.layout, resources)
     }
 
-    /// Does nothing where no pixel has this piece.
+    /// Does nothing where no pixel has this piece; sums those behind it too where one dispatch does several.
     pub fn record(&self, r: &mut Recorder, groups: &[BindGroup], targets: &Targets, piece: usize) {
         let at = ARGUMENTS * piece as u64 + OVER_TILES;
         r.over_shards(Pass::Splat, &self.pipeline, groups, |pass, _| {

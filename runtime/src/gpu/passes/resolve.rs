@@ -1,8 +1,9 @@
-//! The resolve pass: one inside piece of every pixel joins the picture.
+//! The resolve pass: inside pieces of every pixel join the picture.
 
 use super::super::asset::AssetBuffers;
 use super::super::bindings::{Slot, compute, group, layout, pipeline_layout};
 use super::super::shaders;
+use super::super::splatting::SplatPath;
 use super::super::targets::{ARGUMENTS, OVER_CELLS, Targets};
 use super::super::timers::Pass;
 use super::Recorder;
@@ -15,6 +16,8 @@ pub(crate) struct Resolve {
     pipeline: ComputePipeline,
     /// Whether tiles kept the sums, or quads blended them.
     kept: bool,
+    /// Pieces that a dispatch joins.
+    pieces: usize,
 }
 
 impl Resolve {
@@ -26,14 +29,16 @@ impl Resolve {
         let source = if kept { shaders::RESOLVE_KEPT } else { shaders::RESOLVE_BLENDED };
         let pipeline_layout = pipeline_layout(device, "resolve", common, &layout);
         let module = shaders::module(device, "resolve", source);
-        let constants = [("HETEROGENEOUS", f64::from(u8::from(asset.heterogeneous)))];
+        let pieces = if kept { asset.pieces_at_once(SplatPath::Tiles) } else { 1 };
+        let heterogeneous = f64::from(u8::from(asset.heterogeneous));
+        let constants = [("HETEROGENEOUS", heterogeneous), ("PIECES", pieces as f64)];
         let pipeline = compute(device, "resolve", &pipeline_layout, &module, &constants);
-        Self { layout, pipeline, kept }
+        Self { layout, pipeline, kept, pieces }
     }
 
     pub fn bind(&self, device: &Device, targets: &Targets, piece: usize) -> BindGroup {
         let t = targets;
-        let mut resources = vec![t.piece(piece)];
+        let mut resources = vec![t.pieces(piece, self.pieces)];
         resources.extend([&t.profile, &t.front, &t.radiance, &t.counters].map(|b| b.as_entire_binding()));
         if self.kept {
             resources.push(t.kept.as_entire_binding());
@@ -43,7 +48,7 @@ impl Resolve {
         group(device, "resolve", &self.layout, resources)
     }
 
-    /// Does nothing where no pixel has this piece.
+    /// Does nothing where no pixel has this piece; joins those behind it too where one dispatch does several.
     pub fn record(&self, r: &mut Recorder, group: &BindGroup, targets: &Targets, piece: usize) {
         let at = ARGUMENTS * piece as u64 + OVER_CELLS;
         r.compute(Pass::Resolve, &self.pipeline, group, |pass| {

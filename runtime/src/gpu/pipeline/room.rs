@@ -25,7 +25,8 @@ impl Pipeline {
     /// A lot with its samples cut into as many slices as keep the device busy.
     pub(in crate::gpu) fn cut(&self, lot: Lot) -> Lot {
         let samples = self.asset.shards.iter().map(|s| s.range.len()).max().unwrap_or(0);
-        let lot = lot.sliced(self.workgroups, samples.div_ceil(BATCH) as u32, self.most_sums);
+        let (clusters, pieces) = (samples.div_ceil(BATCH) as u32, self.pieces_at_once() as u64);
+        let lot = lot.sliced(self.workgroups, clusters, pieces, self.most_sums);
         if self.asset.pixel_state().kept { lot.kept() } else { lot }
     }
 
@@ -59,6 +60,11 @@ impl Pipeline {
         self.workgroups = if self.path() == SplatPath::Tiles { workgroups } else { 0 };
         self.make_splatting(device);
         self.forget_targets();
+    }
+
+    /// Pieces of a ray that one dispatch sums.
+    pub(super) fn pieces_at_once(&self) -> usize {
+        self.asset.pieces_at_once(self.path())
     }
 
     pub(super) fn make_splatting(&mut self, device: &Device) {

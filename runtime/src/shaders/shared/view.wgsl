@@ -32,6 +32,7 @@ struct View {
     per_unit: f32,          // the object's units of a world unit
     slices: u32,            // that the samples are cut into, each of which sums for itself
     pixels: u32,            // of all tiles that are drawn together
+    sharers: u32,           // workgroups of the gather pass for each square of 16 x 16 pixels
     unused: array<vec4u, 4>,
 }
 
