@@ -3,12 +3,14 @@
 use super::tiles::Tile;
 use diaphane_formats::picture::Picture;
 use rayon::prelude::*;
+use std::ops::AddAssign;
 
 /// Pixels that are worth waking another thread for.
 const SHARED: usize = 1 << 15;
 
-/// Writes the mean of so many rays to the pixels of a tile, and their share that hit to the coverage. Returns the sums of the counts:
-/// rays that hit, pieces dropped, kernels, rays without a kernel.
+/// Writes the mean of so many rays to the pixels of a tile, and their share that hit to the coverage; sums that lie one tile behind
+/// the other are those of rays drawn side by side. Returns the sums of the counts: rays that hit, pieces dropped, kernels, rays
+/// without a kernel.
 pub(super) fn paint(
     picture: &mut Picture,
     tile: Tile,
@@ -16,6 +18,10 @@ pub(super) fn paint(
     counts: &[[u32; 4]],
     rays: usize,
 ) -> [u64; 4] {
+    let one = tile.pixels() as usize;
+    if radiance.len() > one {
+        return paint(picture, tile, &stacked(radiance, one), &stacked(counts, one), rays);
+    }
     let width = picture.width.max(1);
     let [left, top] = tile.start.map(|n| n as usize);
     let [columns, rows] = tile.size.map(|n| n as usize);
@@ -38,6 +44,18 @@ pub(super) fn paint(
         let from = radiance.par_chunks(columns).zip(counts.par_chunks(columns));
         to.zip(from).take(rows).with_min_len(least).map(row).reduce(|| [0; 4], added)
     }
+}
+
+/// The sum of what lies every `one` entries.
+fn stacked<T: Copy + AddAssign>(layers: &[[T; 4]], one: usize) -> Vec<[T; 4]> {
+    let mut layers = layers.chunks_exact(one);
+    let mut sum = layers.next().map_or_else(Vec::new, <[[T; 4]]>::to_vec);
+    for layer in layers {
+        for (sum, more) in sum.iter_mut().zip(layer) {
+            sum.iter_mut().zip(more).for_each(|(s, m)| *s += *m);
+        }
+    }
+    sum
 }
 
 /// Pixels and coverage of a picture's row, radiance and counts of a tile's.
@@ -85,6 +103,19 @@ mod tests {
             all = added(all, counts.map(u64::from));
         }
         all
+    }
+
+    #[test]
+    fn rays_side_by_side_are_summed() {
+        let tile = Tile { start: [1, 2], size: [3, 2] };
+        let radiance: Vec<[f32; 4]> = (0..18).map(|i| [i as f32, 1.0, 0.5 * i as f32, 0.0]).collect();
+        let counts: Vec<[u32; 4]> = (0..18).map(|i| [u32::from(i >= 6), 1, i, 0]).collect();
+        let mut picture = Picture { coverage: Some(vec![0.0; 20]), ..Picture::new(5, 4) };
+        let sums = paint(&mut picture, tile, &radiance, &counts, 3);
+        assert_eq!(sums, [12, 18, 153, 0]);
+        // The fifth pixel of the tile: entries 4, 10 and 16.
+        assert_eq!(picture.pixels[3 * 5 + 2], [10.0, 1.0, 5.0]);
+        assert_eq!(picture.coverage.unwrap()[3 * 5 + 2], 2.0 / 3.0);
     }
 
     #[test]

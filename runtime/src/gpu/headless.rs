@@ -4,6 +4,7 @@ use super::arrived;
 use super::census;
 use super::device::{GpuDevice, instance};
 use super::faults::wait;
+use super::lot::Lot;
 use super::pipeline::Pipeline;
 use super::readback::Staging;
 use super::splatting::SplatPath;
@@ -29,6 +30,7 @@ pub struct GpuRenderer {
     name: String,
     tiles: usize,
     slices: u32,
+    rays_at_once: usize,
     staging: Staging,
     canvas: Canvas,
 }
@@ -54,7 +56,7 @@ impl GpuRenderer {
         let timers = Timers::new(&owned.device, &owned.queue, 1);
         let name = owned.describe();
         let (staging, canvas) = (Staging::default(), Canvas::default());
-        Ok(Self { owned, renderer, timers, name, tiles: 0, slices: 1, staging, canvas })
+        Ok(Self { owned, renderer, timers, name, tiles: 0, slices: 1, rays_at_once: 1, staging, canvas })
     }
 
     /// The adapter's name, backend, and whether it is software.
@@ -82,8 +84,8 @@ impl GpuRenderer {
         self.renderer.path()
     }
 
-    /// Has several workgroups share a square of 16 × 16 pixels where there are fewer squares than this, a slice of the samples
-    /// each. At first as suits the adapter: 1,024, or 0 (never) on a software adapter; without effect on quads.
+    /// Has rays of a pixel drawn side by side, and several workgroups share a square of 16 × 16 pixels, a slice of the samples each,
+    /// where there are fewer squares than this. At first as suits the adapter: 1,024, or 0 (never) on a software adapter; without effect on quads.
     pub fn set_workgroups(&mut self, workgroups: u32) {
         self.renderer.set_workgroups(&self.owned.device, workgroups);
     }
@@ -111,7 +113,13 @@ impl GpuRenderer {
         self.slices
     }
 
-    /// Parts that the mesh is cut into, likewise.
+    /// Rays of a pixel of the last picture that were drawn side by side: more than one where it had fewer squares of 16 × 16 pixels
+    /// than [`Self::set_workgroups`] says.
+    pub fn rays_at_once(&self) -> usize {
+        self.rays_at_once
+    }
+
+    /// Parts that the mesh is cut into, where it is too large for the adapter's bindings.
     pub fn mesh_parts(&self) -> usize {
         self.renderer.asset.mesh.len()
     }
@@ -264,9 +272,11 @@ impl GpuRenderer {
     ) -> Result<[f64; PASSES]> {
         let area = self.area(frame);
         let GpuDevice { device, queue, .. } = &self.owned;
-        let tiles = self.renderer.begin(device, queue, frame, exact, area)?;
+        let tiles = self.renderer.begin(device, queue, frame, exact, area, offsets.len())?;
         self.tiles = tiles.len();
-        self.slices = self.renderer.largest(&tiles).slices;
+        self.slices = self.renderer.largest(device, &tiles, offsets.len()).slices;
+        self.rays_at_once =
+            tiles.first().map_or(1, |t| self.renderer.rays_at_once(device, *t, offsets.len()));
         let submissions = if offsets.len() > 1 { offsets.len() as u64 + 1 } else { 1 };
         if self.timers.capacity() < submissions {
             self.timers = Timers::new(device, queue, submissions);
@@ -289,25 +299,26 @@ impl GpuRenderer {
         wanted: Wanted,
     ) -> Result<()> {
         let (device, queue, timers) = (&self.owned.device, &self.owned.queue, &mut self.timers);
-        self.renderer.write_views(device, queue, frame, &[tile], offsets, 0);
+        let lots = self.renderer.write_rays(device, queue, frame, tile, offsets);
+        let all = lots.first().map_or_else(Lot::default, |(lot, _)| *lot);
         timers.restart();
         let mut encoder = device.create_command_encoder(&Default::default());
-        self.renderer.record_start(&mut encoder, tile);
+        self.renderer.record_start(&mut encoder, all);
         if first {
             self.renderer.record_lighting(&mut encoder, timers);
         }
-        for view in 0..offsets.len() {
-            // Where there are several rays a submission for each keeps every one short, whatever the adapter's patience.
-            if offsets.len() > 1 {
+        for &(lot, view) in &lots {
+            // Where there are several a submission for each keeps every one short, whatever the adapter's patience.
+            if lots.len() > 1 {
                 let done =
                     std::mem::replace(&mut encoder, device.create_command_encoder(&Default::default()));
                 close(done, timers, queue);
             }
-            self.renderer.record_ray(&mut encoder, timers, view, tile, None);
+            self.renderer.record_ray(&mut encoder, timers, view, lot, None);
         }
         timers.close(&mut encoder);
         let targets = self.renderer.targets().ok_or_else(nothing)?;
-        let size = 16 * tile.pixels();
+        let size = 16 * all.pixels;
         let mut sources: Vec<(&Buffer, u64)> =
             vec![(&targets.radiance, size), (&targets.counters, size), (&targets.census, CENSUS)];
         sources.extend((wanted == Wanted::Rays).then(|| (&targets.pieces, targets.pieces.size())));
@@ -367,7 +378,8 @@ enum Wanted {
     Rays,
 }
 
-/// What was read back of a tile: an entry for each pixel, rows one after the other.
+/// What was read back of a tile: an entry for each pixel, rows one after the other; once more for each of the rays that were drawn
+/// side by side.
 struct TileData<'a> {
     /// Sum of radiance over the rays.
     radiance: &'a [[f32; 4]],

@@ -142,8 +142,8 @@ impl PictureRenderer {
         if frame.width.max(frame.height) > side {
             return Err(Error::Gpu(format!("the picture is larger than the adapter's {side} pixels")));
         }
-        let tiles =
-            self.passes.begin(device, queue, frame, request.exact, [[0; 2], [frame.width, frame.height]])?;
+        let area = [[0; 2], [frame.width, frame.height]];
+        let tiles = self.passes.begin(device, queue, frame, request.exact, area, 1)?;
         self.tiles = tiles.len();
         let first = if tiles.len() > 1 { 0 } else { request.rays.start };
         let offsets = scattered_offsets(frame.samples_per_pixel);

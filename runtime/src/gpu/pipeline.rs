@@ -153,7 +153,7 @@ impl Pipeline {
     }
 
     /// Uploads a frame's lights, and sees that there are targets for the tiles of `area` (first column and row, and those behind
-    /// the last), which it returns.
+    /// the last), which it returns, when so many rays a pixel are drawn by [`Self::write_rays`].
     pub(super) fn begin(
         &mut self,
         device: &Device,
@@ -161,14 +161,16 @@ impl Pipeline {
         frame: &Frame,
         exact: Option<&ExactDepths>,
         area: [[u32; 2]; 2],
+        rays: usize,
     ) -> Result<Vec<Tile>> {
         self.light(device, queue, &[Object { slot: 0, frame, exact }])?;
         let mut tiles = self.split(device, area)?;
-        let fits = self.targets.as_ref().is_some_and(|(t, _)| t.lot.holds(self.largest(&tiles)));
+        let fits =
+            self.targets.as_ref().is_some_and(|(t, _)| t.lot.holds(self.largest(device, &tiles, rays)));
         if !fits || self.frame.take_changed() {
             let mut old = self.targets.take().map(|(t, _)| t).filter(|_| fits);
             let targets = loop {
-                let made = old.take().map_or_else(|| self.allocate(device, &tiles), Ok);
+                let made = old.take().map_or_else(|| self.allocate(device, &tiles, rays), Ok);
                 match made {
                     Err(Error::GpuMemory(what)) if self.shrink(&what) => tiles = self.split(device, area)?,
                     made => break made?,

@@ -17,8 +17,8 @@ use wgpu::{
 pub(super) const SUM_FORMAT: TextureFormat = TextureFormat::Rgba32Float;
 /// Format of the attachment that the surface pass does not write.
 pub(super) const MARKER_FORMAT: TextureFormat = TextureFormat::R8Unorm;
-/// Bytes of one piece's indirect arguments: a dispatch over cells of 8 × 8 pixels (three words, one unused), one over the listed
-/// tiles of 16 × 16 (likewise).
+/// Bytes of one piece's indirect arguments: a dispatch over cells of 8 × 8 pixels (three words), one over the listed tiles of
+/// 16 × 16; a word behind each has bits for the views that have the piece.
 pub(super) const ARGUMENTS: u64 = 32;
 /// Where the dispatches are in them.
 pub(super) const OVER_CELLS: u64 = 0;

@@ -42,7 +42,8 @@ fn list(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) group
         }
         if (batch == 0u && medium.first == 0u) {
             atomicAdd(&census[TILES + k], tiles);
-            atomicAdd(&census[PIECES + k], 1u);
+            let views = vec2u(arguments[k * ARGUMENTS + 3u], arguments[k * ARGUMENTS + 7u]);
+            atomicAdd(&census[PIECES + k], countOneBits(views.x) + countOneBits(views.y));
         }
         if (!DRAWN) {
             continue;

@@ -81,6 +81,8 @@ fn list_tile(k: u32, tile: vec3u, columns: u32) {
         atomicStore(&arguments[LISTS + k * stride + place], tile.x | (tile.y << 13u) | (tile.z << 26u));
         atomicMax(&arguments[k * ARGUMENTS + OVER_TILES + 1u], view.sharers);
         atomicMax(&arguments[k * ARGUMENTS + OVER_TILES + 2u], 1u);
+        // The words behind the dispatches say which of the views have the piece.
+        atomicOr(&arguments[k * ARGUMENTS + select(3u, 7u, tile.z >= 32u)], 1u << (tile.z & 31u));
     }
 }
 

@@ -6,9 +6,10 @@ use crate::{gpu, gpu_with};
 use diaphane_formats::asset::Asset;
 use diaphane_formats::scene::Camera;
 use diaphane_runtime::frame::Frame;
-use diaphane_runtime::gpu::{GpuDevice, GpuRenderer, SplatPath, instance};
+use diaphane_runtime::gpu::{GpuDevice, GpuRenderer, SplatPath};
 use diaphane_runtime::player::{Backend, LightMode, Player};
 use diaphane_runtime::rendered::Rendered;
+use diaphane_runtime::wgpu;
 use glam::DVec3;
 
 /// Of several sizes, numbers of rays and areas; the last one sees nothing.
@@ -63,7 +64,8 @@ fn a_frame_makes_no_buffers_that_stay() {
     if gpu(&asset).is_none() {
         return;
     }
-    let instance = instance();
+    // One of its own: all others share the process's.
+    let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle().with_env());
     let device = GpuDevice::open(&instance, None).unwrap();
     let mut renderer = GpuRenderer::on(device, &asset, Some(SplatPath::Quads)).unwrap();
     let frames = frames(&asset);

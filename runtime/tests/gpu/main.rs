@@ -11,6 +11,7 @@ mod host;
 mod objects;
 mod scenes;
 mod shards;
+mod side_by_side;
 mod together;
 
 use diaphane_formats::asset::Asset;

@@ -2,8 +2,8 @@
 
 use super::axes::SCATTERINGS;
 use diaphane_formats::asset::Asset;
-use diaphane_runtime::gpu::{GpuDevice, GpuRenderer, instance};
 use diaphane_runtime::Result;
+use diaphane_runtime::gpu::{GpuDevice, GpuRenderer, instance};
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicUsize, Ordering};
 

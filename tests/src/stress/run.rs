@@ -52,7 +52,8 @@ pub fn run(plan: &Plan, settings: Settings, progress: &dyn Progress, done: &dyn 
         done(&name, cells.len());
     }
     if settings.gpu {
-        let left = |l: &&Line| l.findings.gpu_rays == 0 && l.findings.skipped.iter().all(|(c, _)| *c != "gpu");
+        let left =
+            |l: &&Line| l.findings.gpu_rays == 0 && l.findings.skipped.iter().all(|(c, _)| *c != "gpu");
         match report.lines.iter().filter(left).count() {
             0 => (),
             cells => report.skip("gpu", &gpu.why_not(), cells),

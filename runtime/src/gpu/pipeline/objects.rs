@@ -103,6 +103,34 @@ impl Pipeline {
         self.upload_views(device, queue);
     }
 
+    /// Uploads the rays of a tile of the object that was begun. Returns what is drawn one after the other: rays side by side, and the
+    /// view that is their first.
+    pub(in crate::gpu) fn write_rays(
+        &mut self,
+        device: &Device,
+        queue: &Queue,
+        frame: &Frame,
+        tile: Tile,
+        offsets: &[[f32; 2]],
+    ) -> Vec<(Lot, usize)> {
+        self.views.truncate(self.relit.len());
+        let most = self.rays_at_once(device, tile, offsets.len());
+        let mut lots = Vec::new();
+        for (n, some) in offsets.chunks(most).enumerate() {
+            let first = self.views.len();
+            let mut lot = Lot::default();
+            for (&offset, rays) in some.iter().zip((n * most + 1) as u32..) {
+                let view = self.view(0, frame, tile, offset, rays).at(lot.add(tile));
+                self.views.push(view);
+            }
+            let lot = self.cut(lot);
+            self.views[first..].iter_mut().for_each(|view| *view = view.of(&lot));
+            lots.push((lot, first - self.relit.len()));
+        }
+        self.upload_views(device, queue);
+        lots
+    }
+
     /// Adds the views of objects that are drawn together, a ray through the middle of every pixel. Says how much they are, and which
     /// view is their first.
     pub(in crate::gpu) fn add_lot(&mut self, drawn: &[Drawn<'_>]) -> (Lot, usize) {

@@ -2,12 +2,15 @@
 
 use super::Pipeline;
 use crate::Result;
-use crate::gpu::lot::Lot;
+use crate::gpu::lot::{Lot, MOST_VIEWS};
 use crate::gpu::shard::BATCH;
 use crate::gpu::splatting::{SplatPath, Splatting};
 use crate::gpu::targets::{LEAST, Targets, budget};
 use crate::gpu::tiles::{Tile, split};
 use wgpu::Device;
+
+/// Pixels of rays that are drawn side by side, at the most: all of them are read back.
+const SIDE_BY_SIDE: u64 = 1 << 17;
 
 impl Pipeline {
     pub(super) fn split(&self, device: &Device, [low, high]: [[u32; 2]; 2]) -> Result<Vec<Tile>> {
@@ -17,9 +20,33 @@ impl Pipeline {
         Ok(tiles)
     }
 
-    /// How much state tiles have that are drawn one after the other.
-    pub(in crate::gpu) fn largest(&self, tiles: &[Tile]) -> Lot {
-        tiles.iter().map(|t| self.cut((*t).into())).fold(Lot::default(), Lot::or)
+    /// How much state tiles have that are drawn one after the other, of so many rays a pixel.
+    pub(in crate::gpu) fn largest(&self, device: &Device, tiles: &[Tile], rays: usize) -> Lot {
+        let of = |tile: &Tile| {
+            let most = self.rays_at_once(device, *tile, rays);
+            let lot = self.side_by_side(*tile, most);
+            // The last ones may be fewer, in more slices.
+            let last = rays % most;
+            if last == 0 { lot } else { lot.or(self.side_by_side(*tile, last)) }
+        };
+        tiles.iter().map(of).fold(Lot::default(), Lot::or)
+    }
+
+    fn side_by_side(&self, tile: Tile, rays: usize) -> Lot {
+        let mut lot = Lot::default();
+        for _ in 0..rays {
+            lot.add(tile);
+        }
+        self.cut(lot)
+    }
+
+    /// Of `rays` rays of a tile's pixels those that are drawn side by side, each as a tile of its own: many for a small picture,
+    /// which would leave the device idle otherwise.
+    pub(in crate::gpu) fn rays_at_once(&self, device: &Device, tile: Tile, rays: usize) -> usize {
+        let room = budget(device, self.asset.pixel_state(), self.most_memory).pixels();
+        let busy = u64::from(self.workgroups) / Lot::from(tile).tiles.max(1);
+        let most = busy.min(room.min(SIDE_BY_SIDE) / tile.pixels().max(1)) as usize;
+        rays.min(most).clamp(1, MOST_VIEWS)
     }
 
     /// A lot with its samples cut into as many slices as keep the device busy.
@@ -30,9 +57,9 @@ impl Pipeline {
         if self.asset.pixel_state().kept { lot.kept() } else { lot }
     }
 
-    pub(super) fn allocate(&mut self, device: &Device, tiles: &[Tile]) -> Result<Targets> {
+    pub(super) fn allocate(&mut self, device: &Device, tiles: &[Tile], rays: usize) -> Result<Targets> {
         let state = self.asset.pixel_state();
-        let lot = self.largest(tiles);
+        let lot = self.largest(device, tiles, rays);
         self.tile_memory = budget(device, state, self.most_memory).pixel_total * lot.pixels;
         Targets::allocate(device, state, lot, self.path(), self.tile_memory)
     }
