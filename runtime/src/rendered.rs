@@ -73,9 +73,9 @@ pub struct Census {
     pub tiles: u64,
     /// Of these, the ones where no ray is inside the object: nothing is gathered there.
     pub tiles_empty: u64,
-    /// Pieces of rays that are drawn one after the other, [`MAX_PIECES`] a view.
+    /// Pieces of rays, [`MAX_PIECES`] a view.
     pub pieces: u64,
-    /// Of these, the ones that no ray has: their passes do nothing.
+    /// Of these, the ones that no ray has: nothing is done for them.
     pub pieces_empty: u64,
 }
 

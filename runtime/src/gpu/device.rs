@@ -3,7 +3,7 @@
 use super::faults::Faults;
 use super::host::Renderer;
 use crate::{Error, Result};
-use std::sync::LazyLock;
+use std::sync::{Mutex, PoisonError};
 use wgpu::{
     Adapter, Backends, Device, DeviceDescriptor, DeviceType, DownlevelFlags, Features, Instance,
     InstanceDescriptor, Queue, Surface,
@@ -30,12 +30,34 @@ const NEEDED_FLAGS: DownlevelFlags = DownlevelFlags::COMPUTE_SHADERS
     .union(DownlevelFlags::VERTEX_STORAGE)
     .union(DownlevelFlags::INDIRECT_EXECUTION);
 
-/// An instance with all backends of this platform; the environment variables that wgpu knows apply. The process has one, which
-/// stays: NVIDIA's driver 580 is not found any more after it was let go of and loaded again some thirty times.
+/// The process's instances, of which the last is in use. They stay: NVIDIA's driver 580 is not found any more after it was let go
+/// of and loaded again some thirty times.
+static INSTANCES: Mutex<Instances> = Mutex::new(Instances { all: Vec::new(), stale: false });
+
+struct Instances {
+    all: Vec<Instance>,
+    /// A device was lost since the last one was made, which may know adapters that are gone.
+    stale: bool,
+}
+
+/// The process's instance with all backends of this platform, a new one when a device was lost; the environment variables that wgpu
+/// knows apply.
 pub fn instance() -> Instance {
-    static INSTANCE: LazyLock<Instance> =
-        LazyLock::new(|| Instance::new(InstanceDescriptor::new_without_display_handle().with_env()));
-    INSTANCE.clone()
+    let mut known = INSTANCES.lock().unwrap_or_else(PoisonError::into_inner);
+    match known.all.last() {
+        Some(last) if !known.stale => last.clone(),
+        _ => {
+            let new = Instance::new(InstanceDescriptor::new_without_display_handle().with_env());
+            known.all.push(new.clone());
+            known.stale = false;
+            new
+        }
+    }
+}
+
+/// Has the next instance look for adapters anew.
+pub(super) fn look_again() {
+    INSTANCES.lock().unwrap_or_else(PoisonError::into_inner).stale = true;
 }
 
 impl GpuDevice {
@@ -51,9 +73,13 @@ impl GpuDevice {
         adapters.sort_by_key(|a| rank(a.get_info().device_type));
         let mut refused = Vec::new();
         for adapter in adapters {
-            match lacking(&adapter, surface) {
-                None => return Self::request(adapter, u64::MAX),
-                Some(reason) => refused.push(format!("{} {reason}", adapter.get_info().name)),
+            if let Some(reason) = lacking(&adapter, surface) {
+                refused.push(format!("{} {reason}", adapter.get_info().name));
+                continue;
+            }
+            match Self::request(adapter, u64::MAX) {
+                Err(Error::NoAdapter(reason)) => refused.push(reason),
+                done => return done,
             }
         }
         Err(Error::NoAdapter(refused.join(", ")))

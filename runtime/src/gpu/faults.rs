@@ -1,6 +1,7 @@
 //! What a GPU does to a program that draws with it: it goes away, or has no memory left. Both become errors here; neither may end
 //! the program in a panic, which wgpu answers a lost device with in some places.
 
+use super::device::look_again;
 use crate::{Error, Result};
 use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -38,7 +39,10 @@ impl Faults {
     fn lose(&self, reason: DeviceLostReason, message: &str) {
         let why = match reason {
             DeviceLostReason::Destroyed => "it was destroyed by the program".to_owned(),
-            DeviceLostReason::Unknown => first_lines(message),
+            DeviceLostReason::Unknown => {
+                look_again();
+                first_lines(message)
+            }
         };
         log::debug!("the device was lost: {why}");
         self.0.lock().unwrap_or_else(PoisonError::into_inner).lost.get_or_insert(why);

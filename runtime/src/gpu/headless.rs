@@ -84,8 +84,8 @@ impl GpuRenderer {
         self.renderer.path()
     }
 
-    /// Has rays of a pixel drawn side by side, and several workgroups share a square of 16 × 16 pixels, a slice of the samples each,
-    /// where there are fewer squares than this. At first as suits the adapter: 1,024, or 0 (never) on a software adapter; without effect on quads.
+    /// Has as many rays of a pixel drawn side by side (at most 64, and 131,072 pixels) and then as many workgroups share a square of
+    /// 16 × 16 pixels, a slice of the samples each, as it takes to make this many workgroups of all squares. At first as suits the adapter: 1,024, or 0 (never) on a software adapter; without effect on quads.
     pub fn set_workgroups(&mut self, workgroups: u32) {
         self.renderer.set_workgroups(&self.owned.device, workgroups);
     }
@@ -113,8 +113,7 @@ impl GpuRenderer {
         self.slices
     }
 
-    /// Rays of a pixel of the last picture that were drawn side by side: more than one where it had fewer squares of 16 × 16 pixels
-    /// than [`Self::set_workgroups`] says.
+    /// Rays of a pixel of the last picture that were drawn side by side: see [`Self::set_workgroups`].
     pub fn rays_at_once(&self) -> usize {
         self.rays_at_once
     }
@@ -274,9 +273,10 @@ impl GpuRenderer {
         let GpuDevice { device, queue, .. } = &self.owned;
         let tiles = self.renderer.begin(device, queue, frame, exact, area, offsets.len())?;
         self.tiles = tiles.len();
-        self.slices = self.renderer.largest(device, &tiles, offsets.len()).slices;
-        self.rays_at_once =
-            tiles.first().map_or(1, |t| self.renderer.rays_at_once(device, *t, offsets.len()));
+        if let Some(&tile) = tiles.first() {
+            self.rays_at_once = self.renderer.rays_at_once(device, tile, offsets.len());
+            self.slices = self.renderer.side_by_side(tile, self.rays_at_once).slices;
+        }
         let submissions = if offsets.len() > 1 { offsets.len() as u64 + 1 } else { 1 };
         if self.timers.capacity() < submissions {
             self.timers = Timers::new(device, queue, submissions);

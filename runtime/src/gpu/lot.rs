@@ -84,6 +84,7 @@ impl Lot {
     /// at once and at most so many sums can be kept.
     pub fn sliced(self, wanted: u32, clusters: u32, pieces: u64, most_sums: u64) -> Self {
         let most = u64::from(clusters).min(most_sums / (pieces * self.pixels).max(1));
+        let most = most.min(u64::from(MOST_SHARERS / SHARED_HALVES));
         let slices = (u64::from(wanted) / self.tiles.max(1)).min(most).max(1) as u32;
         if slices == 1 {
             return self;
@@ -100,6 +101,8 @@ impl Lot {
 
 /// Halves of a square of pixels, each of which has a workgroup where samples are cut into slices alone.
 const SHARED_HALVES: u32 = 2;
+/// Workgroups that a dispatch has along one axis.
+const MOST_SHARERS: u32 = 65_535;
 
 impl From<Tile> for Lot {
     fn from(tile: Tile) -> Self {

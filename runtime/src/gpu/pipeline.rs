@@ -85,6 +85,7 @@ struct Groups {
     pieces: Vec<PieceGroups>,
 }
 
+/// Those of the pieces that are summed at once.
 struct PieceGroups {
     profile: Option<BindGroup>,
     sums: SumGroups,
@@ -326,7 +327,7 @@ impl Pipeline {
             self.outlines.record(r, &groups.outlines, &self.asset);
             self.batches.record(r, &groups.batches, &self.asset);
         }
-        for (k, piece) in groups.pieces.iter().enumerate() {
+        for (k, piece) in (0..MAX_PIECES).step_by(self.pieces_at_once()).zip(&groups.pieces) {
             if let (Some(profile), Some(group)) = (&self.profile, &piece.profile) {
                 profile.record(r, group, targets, k);
             }

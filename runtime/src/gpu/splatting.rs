@@ -29,8 +29,8 @@ impl SplatPath {
         if quads { Self::Quads } else { Self::Tiles }
     }
 
-    /// How many workgroups keep a device busy: where a picture has fewer tiles several share each of them. A software adapter has
-    /// no more than a few threads.
+    /// How many workgroups keep a device busy: where a picture has fewer tiles rays are drawn side by side, and several share each
+    /// tile. A software adapter has no more than a few threads.
     pub(super) fn workgroups(self, device: &Device) -> u32 {
         let software = device.adapter_info().device_type == DeviceType::Cpu;
         if self == Self::Quads || software { 0 } else { 1024 }
@@ -81,7 +81,7 @@ pub(super) enum Splatting {
     },
 }
 
-/// The groups of one piece.
+/// The groups of the pieces that are summed at once.
 pub(super) struct SumGroups {
     /// One for each shard, of sums that are blended or join the picture at once.
     shards: Vec<BindGroup>,
@@ -131,7 +131,7 @@ impl Splatting {
         }
     }
 
-    /// For piece `k`.
+    /// For the pieces from `k` on that are summed at once.
     pub fn bind(&self, device: &Device, asset: &AssetBuffers, targets: &Targets, k: usize) -> SumGroups {
         let each = |bind: &dyn Fn(&Shard) -> BindGroup| asset.shards.iter().map(bind).collect::<Vec<_>>();
         let of = |gather: &Gather| each(&|s| gather.bind(device, s, targets, k));
@@ -149,7 +149,7 @@ impl Splatting {
         }
     }
 
-    /// Adds piece `k` of every pixel to the picture.
+    /// Adds these pieces of every pixel to the picture.
     pub fn record(
         &self,
         r: &mut Recorder,

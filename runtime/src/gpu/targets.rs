@@ -36,6 +36,7 @@ pub(super) const BOUNDARY: u64 = 48;
 pub(super) const RADIANCE: u64 = 16;
 pub(super) const COUNTERS: u64 = 16;
 const PIECE: u64 = 16;
+const PIECES: u64 = PIECE * MAX_PIECES as u64;
 const CELL: u64 = 16;
 /// Numerator and denominator, as tiles keep them from shard to shard or slice by slice.
 pub(super) const KEPT: u64 = 32;
@@ -96,20 +97,37 @@ impl PixelState {
     }
 }
 
+impl PixelState {
+    /// Bytes of a pixel in all buffers and textures but for sums that are kept.
+    fn bytes(self) -> u64 {
+        let profile = if self.heterogeneous { PROFILE } else { 0 };
+        let boundary = if self.fresnel { BOUNDARY } else { 0 };
+        // Three vectors of state, two textures, the marker, and what is read back.
+        CROSSINGS + boundary + PIECES + profile + 3 * 16 + 2 * 16 + 1 + 2 * 16
+    }
+
+    /// Bytes of all of a lot's pixels, about.
+    pub fn bytes_of(self, lot: Lot) -> u64 {
+        self.bytes() * lot.pixels + KEPT * lot.sums
+    }
+
+    /// Sums that may be kept of a lot beside the rest of its state, in `total` bytes.
+    pub fn room_for_sums(self, lot: Lot, total: u64) -> u64 {
+        total.saturating_sub(self.bytes() * lot.pixels) / KEPT
+    }
+}
+
 /// How large tiles may be.
 pub(super) fn budget(device: &Device, state: PixelState, total: u64) -> Budget {
     let limits = device.limits();
     let profile = if state.heterogeneous { PROFILE } else { 0 };
-    let boundary = if state.fresnel { BOUNDARY } else { 0 };
-    let pieces = PIECE * MAX_PIECES as u64;
     let kept = if state.kept { KEPT } else { 0 };
     Budget {
         side: limits.max_texture_dimension_2d,
         binding: most_bound(device),
         total,
-        pixel_binding: profile.max(pieces),
-        // Three vectors of state, two textures, the marker, and what is read back.
-        pixel_total: CROSSINGS + boundary + pieces + profile + kept + 3 * 16 + 2 * 16 + 1 + 2 * 16,
+        pixel_binding: profile.max(PIECES),
+        pixel_total: state.bytes() + kept,
     }
 }
 
@@ -162,7 +180,7 @@ impl Targets {
             stride,
             crossings: buffer("crossings", CROSSINGS * pixels, state),
             boundary: buffer("boundary", if needs.fresnel { BOUNDARY * pixels } else { 0 }, state),
-            pieces: buffer("pieces", PIECE * MAX_PIECES as u64 * stride, read),
+            pieces: buffer("pieces", PIECES * stride, read),
             front: buffer("front", 16 * pixels, state),
             radiance: buffer("radiance", RADIANCE * pixels, read),
             counters: buffer("counters", COUNTERS * pixels, read),

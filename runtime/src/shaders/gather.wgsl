@@ -12,7 +12,7 @@
 // Position and sharpness of each sample, then a sphere around the kernels of each cluster of 64.
 @group(1) @binding(0) var<storage, read> samples: array<vec4f>;
 @group(1) @binding(1) var<storage, read> sources: array<vec4f>;  // SOURCE a sample: v, weight; slopes
-@group(1) @binding(2) var<storage, read> tiles: array<u32>;      // column, row (13 bits each) and object of those with pixels inside
+@group(1) @binding(2) var<storage, read> tiles: array<u32>;      // column, row (13 bits each) and view of those with pixels inside
 @group(1) @binding(3) var<storage, read> pieces: array<vec4f>;   // PIECES of every pixel
 @group(1) @binding(4) var<storage, read> profile: array<vec4f>;
 
@@ -178,7 +178,7 @@ fn list_marked(local: u32, before: u32, base: u32) {
     }
 }
 
-// Column and row of a workgroup's tile, whose object is from now on at hand.
+// Column and row of a workgroup's tile, whose view is from now on at hand.
 fn pick_tile(group: u32) -> vec2u {
     let listed_tile = tiles[group];
     view = views[listed_tile >> 26u];

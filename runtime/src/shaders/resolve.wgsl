@@ -1,5 +1,6 @@
-// Resolve pass: radiance of the pieces of each pixel as seen through those in front, added to the picture. Twin of `reconstruct::Along` and the end of `piece_radiance`. Where sums come from, `sums_at`, follows in
-// resolve_blended.wgsl or resolve_kept.wgsl.
+// Resolve pass: radiance of the pieces of each pixel as seen through those in front, added to the picture. Twin of
+// `reconstruct::Along` and the end of `piece_radiance`. Where sums come from, `sums_at`, follows in resolve_blended.wgsl or
+// resolve_kept.wgsl.
 override HETEROGENEOUS: bool = false;
 override PIECES: u32 = 1u; // see gather.wgsl
 

@@ -8,7 +8,7 @@ const STATE: u32 = 10u;
 const BOUNDARY: u32 = 12u;
 const MAX_PIECES: u32 = 4u;
 const CELL: u32 = 8u;
-const ARGUMENTS: u32 = 8u;  // of a piece: dispatch over cells of 8 x 8 pixels (3), unused, over listed tiles (3), unused
+const ARGUMENTS: u32 = 8u;  // of a piece: dispatch over cells of 8 x 8 pixels (3), over listed tiles (3), bits of views behind each
 const OVER_TILES: u32 = 4u; // where the second begins
 const LISTS: u32 = 64u;     // where the lists of tiles of each piece begin; then come a mark for every tile and piece
 
@@ -72,7 +72,7 @@ fn segments(
     }
 }
 
-// Lists a tile of 16 x 16 pixels of an object that have piece k, once.
+// Lists a tile of 16 x 16 pixels of a view that have piece k, once.
 fn list_tile(k: u32, tile: vec3u, columns: u32) {
     let stride = (arrayLength(&arguments) - LISTS) / (2u * MAX_PIECES);
     let mark = LISTS + (MAX_PIECES + k) * stride + view.first_tile + tile.y * columns + tile.x;

@@ -2,10 +2,10 @@
 
 use super::axes::SCATTERINGS;
 use diaphane_formats::asset::Asset;
-use diaphane_runtime::Result;
 use diaphane_runtime::gpu::{GpuDevice, GpuRenderer, instance};
-use std::sync::OnceLock;
+use diaphane_runtime::{Error, Result};
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, OnceLock, PoisonError};
 
 /// Why a software adapter leaves most cells out.
 const SOFTWARE: &str = "a software adapter draws one scattering of every fourth body";
@@ -16,15 +16,17 @@ const EVERY: usize = 4;
 /// The adapter, as far as it is known.
 pub struct Gpu {
     wanted: bool,
-    /// One for each scattering, whose renderers follow each other, or why there is none.
-    devices: [OnceLock<std::result::Result<GpuDevice, String>>; SCATTERINGS.len()],
+    /// Whether the adapter is a program itself, or why there is none.
+    software: OnceLock<std::result::Result<bool, String>>,
+    /// One for each scattering, whose renderers follow each other.
+    devices: [Mutex<Option<GpuDevice>>; SCATTERINGS.len()],
     body: AtomicUsize,
 }
 
 impl Gpu {
     /// A GPU that is `wanted` or not.
     pub fn new(wanted: bool) -> Self {
-        Self { wanted, devices: Default::default(), body: 0.into() }
+        Self { wanted, software: OnceLock::new(), devices: Default::default(), body: 0.into() }
     }
 
     /// Body number `b` is next.
@@ -34,31 +36,43 @@ impl Gpu {
 
     /// Why cells were not drawn.
     pub fn why_not(&self) -> String {
-        let known = || self.devices.iter().filter_map(OnceLock::get);
-        let software = || known().flatten().any(GpuDevice::is_software);
-        match known().find_map(|d| d.as_ref().err()) {
-            Some(reason) => format!("no adapter: {reason}"),
-            None if software() => SOFTWARE.to_owned(),
-            None => "no ray passes the object".to_owned(),
+        match self.software.get() {
+            Some(Err(reason)) => format!("no adapter: {reason}"),
+            Some(Ok(true)) => SOFTWARE.to_owned(),
+            _ => "no ray passes the object".to_owned(),
         }
     }
 
     /// The renderer of an asset under scattering number `s` of its body; `None` where it is not to be drawn.
     ///
     /// # Errors
-    /// An adapter that fails.
+    /// An adapter that fails, or that is gone after it was there.
     pub fn renderer(&self, asset: &Asset, s: usize) -> Result<Option<GpuRenderer>> {
         if !self.wanted {
             return Ok(None);
         }
-        let open = || GpuDevice::open(&instance(), None).map_err(|e| e.to_string());
-        let Ok(device) = self.devices[s % self.devices.len()].get_or_init(open) else {
-            return Ok(None);
+        let look = || match GpuDevice::open(&instance(), None) {
+            Ok(device) => Ok(device.is_software()),
+            Err(e) => Err(e.to_string()),
         };
         let some = s == 0 && self.body.load(Ordering::Relaxed).is_multiple_of(EVERY);
-        if device.is_software() && !some {
-            return Ok(None);
+        match self.software.get_or_init(look) {
+            Ok(software) if some || !software => {
+                GpuRenderer::on(self.device(s % self.devices.len())?, asset, None).map(Some)
+            }
+            _ => Ok(None),
         }
-        GpuRenderer::on(device.clone(), asset, None).map(Some)
+    }
+
+    /// A device that stays, opened again when it was lost.
+    fn device(&self, s: usize) -> Result<GpuDevice> {
+        let mut known = self.devices[s].lock().unwrap_or_else(PoisonError::into_inner);
+        let lost = |d: &GpuDevice| matches!(d.check(), Err(Error::Lost(_)));
+        if let Some(device) = known.as_ref().filter(|d| !lost(d)) {
+            return Ok(device.clone());
+        }
+        let device = GpuDevice::open(&instance(), None)?;
+        *known = Some(device.clone());
+        Ok(device)
     }
 }

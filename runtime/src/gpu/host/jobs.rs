@@ -170,8 +170,7 @@ impl Renderer {
             }
             (lot, needs) = (targets.lot.or(needed), known.or(state));
         }
-        let bytes = budget(device, needs, TOTAL).pixel_total * lot.pixels;
-        let targets = Targets::allocate(device, needs, lot, self.path, bytes)?;
+        let targets = Targets::allocate(device, needs, lot, self.path, needs.bytes_of(lot))?;
         self.targets = Some((targets.clone(), needs));
         Ok(targets)
     }

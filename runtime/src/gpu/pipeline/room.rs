@@ -32,7 +32,8 @@ impl Pipeline {
         tiles.iter().map(of).fold(Lot::default(), Lot::or)
     }
 
-    fn side_by_side(&self, tile: Tile, rays: usize) -> Lot {
+    /// The state of so many rays of a tile's pixels side by side.
+    pub(in crate::gpu) fn side_by_side(&self, tile: Tile, rays: usize) -> Lot {
         let mut lot = Lot::default();
         for _ in 0..rays {
             lot.add(tile);
@@ -53,14 +54,16 @@ impl Pipeline {
     pub(in crate::gpu) fn cut(&self, lot: Lot) -> Lot {
         let samples = self.asset.shards.iter().map(|s| s.range.len()).max().unwrap_or(0);
         let (clusters, pieces) = (samples.div_ceil(BATCH) as u32, self.pieces_at_once() as u64);
-        let lot = lot.sliced(self.workgroups, clusters, pieces, self.most_sums);
-        if self.asset.pixel_state().kept { lot.kept() } else { lot }
+        let state = self.asset.pixel_state();
+        let most = self.most_sums.min(state.room_for_sums(lot, self.most_memory));
+        let lot = lot.sliced(self.workgroups, clusters, pieces, most);
+        if state.kept { lot.kept() } else { lot }
     }
 
     pub(super) fn allocate(&mut self, device: &Device, tiles: &[Tile], rays: usize) -> Result<Targets> {
         let state = self.asset.pixel_state();
         let lot = self.largest(device, tiles, rays);
-        self.tile_memory = budget(device, state, self.most_memory).pixel_total * lot.pixels;
+        self.tile_memory = state.bytes_of(lot);
         Targets::allocate(device, state, lot, self.path(), self.tile_memory)
     }
 

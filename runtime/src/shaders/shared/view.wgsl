@@ -1,4 +1,4 @@
-// Camera, tile and frame parameters of one object: mirrors `ViewUniform` in gpu/uniforms.rs.
+// Camera, tile and frame parameters of one object's ray: mirrors `ViewUniform` in gpu/uniforms.rs.
 struct View {
     origin: vec3f,          // centre of projection, relative to the asset's centre
     width: u32,             // of the whole picture, pixels
@@ -36,7 +36,7 @@ struct View {
     unused: array<vec4u, 4>,
 }
 
-// Objects that are drawn together at the most.
+// Views that are drawn together at the most: of several objects, or rays of one.
 const MOST_VIEWS: u32 = 64u;
 
 @group(0) @binding(0) var<uniform> views: array<View, MOST_VIEWS>;

@@ -226,7 +226,7 @@ impl Along {
         let part = |p: usize| {
             let from = from + length * p as f64;
             let rounding = 4.0 * U * (from.abs() + length);
-            let moved = 2.0 * sums.most * rounding;
+            let moved = 2.0 * sums.most * (rounding + blur);
             let before = sums.between(self.start, from);
             let own = sums.between(from, from + length);
             let error = |b: &Between, v: usize| b.misplaced + b.rounded[v] + moved;
@@ -307,7 +307,7 @@ mod tests {
                 within(mean(1), part.scattering, whole.value / part.length);
                 let place = (last[2] - first[2]) / (last[1] - first[1]);
                 let middle = (part.from + 0.5 * part.length - wide_start) as f32;
-                within(place - middle, part.shift, 10.0 * (wide_end - wide_start));
+                within(place - middle, part.shift, 10.0 * part.length);
             }
         }
     }
