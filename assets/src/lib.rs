@@ -3,6 +3,8 @@
 //! Meshes are made by code ([`shapes`]), materials and scenes are TOML files in this folder. [`write_all`] puts
 //! everything into a folder as ordinary input files.
 
+#![warn(clippy::unwrap_used, clippy::expect_used)]
+
 pub mod shapes;
 
 use diaphane_formats::files::write_atomically;

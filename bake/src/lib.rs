@@ -7,6 +7,8 @@
 //! A stage imports only the stages before it; [`pipeline`] runs them, [`cache`] remembers what they made. Nothing here prints; progress and cancellation go through
 //! [`progress::Progress`].
 
+#![warn(clippy::unwrap_used, clippy::expect_used)]
+
 mod blocks;
 pub mod cache;
 mod certificate;

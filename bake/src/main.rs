@@ -1,5 +1,7 @@
 //! `diaphane-bake`: bakes a mesh, or shows what is in an asset.
 
+#![warn(clippy::unwrap_used, clippy::expect_used)]
+
 mod batch;
 mod cli;
 mod inspect;

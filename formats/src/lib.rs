@@ -11,6 +11,8 @@
 //! | ψ = exp(-τ) | transmittance | - |
 //! | Φ(x) = ∫ψ dω | fluence | sr |
 
+#![warn(clippy::unwrap_used, clippy::expect_used)]
+
 pub mod approx;
 pub mod asset;
 pub mod directions;

@@ -8,6 +8,8 @@
 //!
 //! Apart from the player: `gpu::rivals` (a ray marcher and a 3D grid to compare with) and `plot` (charts as SVG).
 
+#![warn(clippy::unwrap_used, clippy::expect_used)]
+
 pub mod cpu;
 pub mod detail;
 pub mod edit;

@@ -6,6 +6,8 @@
 //! mesh, medium, asset ─> rivals ────┘            └─> sweep (table, summary, charts)
 //! ```
 
+#![warn(clippy::unwrap_used, clippy::expect_used)]
+
 pub mod hostile;
 pub mod metrics;
 pub mod play;

@@ -1,5 +1,7 @@
 //! The command line of the validation program.
 
+#![warn(clippy::unwrap_used, clippy::expect_used)]
+
 mod commands;
 
 use clap::{Parser, Subcommand};

@@ -35,7 +35,8 @@ pub(super) fn repair(positions: Vec<DVec3>, triangles: Vec<[u32; 3]>) -> Result<
     let count = |some: &[(&shells::Shell, &Fate)]| some.iter().map(|(s, _)| s.members.len()).sum::<usize>();
     let are_open = solid.iter().all(|(shell, _)| !shell.patches.is_empty());
     let (left, lost) = (count(&solid), count(&flat) + tatters);
-    if are_open && left > 0 && lost * if faces < islands::FEW { 1 } else { LOST } > left {
+    let times = if faces < islands::FEW { 1 } else { LOST };
+    if are_open && left > 0 && lost * times > left {
         return Err(torn(lost, faces));
     }
     // Members in their old order, patches after them.
@@ -81,7 +82,8 @@ fn retain(triangles: &mut Vec<[u32; 3]>, keep: impl Fn(usize) -> bool) {
     });
 }
 
-/// Pieces without open sheets, which triangles were turned, and how many faces of tatters went with the sheets. Where a sheet goes, what it hung on may hang together.
+/// Pieces without open sheets, which triangles were turned, and how many faces of tatters went with the sheets. Where a sheet goes,
+/// what it hung on may hang together.
 fn oriented(
     positions: &[DVec3],
     triangles: &mut Vec<[u32; 3]>,

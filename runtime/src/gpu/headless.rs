@@ -85,7 +85,8 @@ impl GpuRenderer {
     }
 
     /// Has as many rays of a pixel drawn side by side (at most 64, and 131,072 pixels) and then as many workgroups share a square of
-    /// 16 × 16 pixels, a slice of the samples each, as it takes to make this many workgroups of all squares. At first as suits the adapter: 1,024, or 0 (never) on a software adapter; without effect on quads.
+    /// 16 × 16 pixels, a slice of the samples each, as it takes to make this many workgroups of all squares. At first as suits the
+    /// adapter: 1,024, or 0 (never) on a software adapter; without effect on quads.
     pub fn set_workgroups(&mut self, workgroups: u32) {
         self.renderer.set_workgroups(&self.owned.device, workgroups);
     }

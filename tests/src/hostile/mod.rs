@@ -7,8 +7,10 @@
 
 mod entry;
 mod mesh;
+#[expect(clippy::expect_used, reason = "a panic is what the fuzzer looks for")]
 mod object;
 mod pictures;
+#[expect(clippy::expect_used, reason = "a panic is what the fuzzer looks for")]
 mod text;
 
 pub use entry::params;

@@ -1,5 +1,7 @@
 //! `diaphane-play`: opens an asset in a window, or draws one picture of it.
 
+#![warn(clippy::unwrap_used, clippy::expect_used)]
+
 mod args;
 mod bench;
 mod headless;
